@@ -1,0 +1,1 @@
+"""What `make bench` measures: speed, memory and tightness beside published figures."""

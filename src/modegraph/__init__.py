@@ -1,0 +1,128 @@
+"""Prove which controllers can be chained, plan the best chain, run it.
+
+Public names are imported when they are first used, so that ``import modegraph`` stays fast.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
+
+if TYPE_CHECKING:
+    from modegraph.certify.references import References
+    from modegraph.certify.verdict import Status, Verdict, Witness
+    from modegraph.graph.build import build
+    from modegraph.graph.modegraph import ModeGraph
+    from modegraph.graph.submodes import Submode
+    from modegraph.graph.switch import Switch
+    from modegraph.model.memory import Memory
+    from modegraph.model.mode import Mode
+    from modegraph.model.reference import Points, setpoint
+    from modegraph.model.sets.ball import Ball
+    from modegraph.model.sets.box import Box
+    from modegraph.model.sets.ellipsoid import Ellipsoid
+    from modegraph.model.sets.polytope import Polytope
+    from modegraph.model.sets.sublevel import Sublevel
+    from modegraph.model.sets.zonotope import Zonotope
+    from modegraph.model.signals import minimum_energy, minimum_time, quintic
+    from modegraph.model.system import System
+    from modegraph.model.target import Target
+    from modegraph.model.trajectory import trajectory
+    from modegraph.plan.plan import Plan
+    from modegraph.reach.flowpipe import flowpipe
+    from modegraph.run.simulate import Run
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Ball",
+    "Box",
+    "Ellipsoid",
+    "Memory",
+    "Mode",
+    "ModeGraph",
+    "ModegraphError",
+    "NotBuiltYet",
+    "Plan",
+    "Points",
+    "Polytope",
+    "References",
+    "Run",
+    "Status",
+    "Sublevel",
+    "Submode",
+    "Switch",
+    "System",
+    "Target",
+    "Unreachable",
+    "Verdict",
+    "Witness",
+    "Zonotope",
+    "build",
+    "flowpipe",
+    "largest_start",
+    "load",
+    "minimum_energy",
+    "minimum_time",
+    "quintic",
+    "setpoint",
+    "trajectory",
+]
+
+_HOME = {
+    "Ball": "model.sets.ball",
+    "Box": "model.sets.box",
+    "Ellipsoid": "model.sets.ellipsoid",
+    "Memory": "model.memory",
+    "Mode": "model.mode",
+    "ModeGraph": "graph.modegraph",
+    "Plan": "plan.plan",
+    "Points": "model.reference",
+    "Polytope": "model.sets.polytope",
+    "References": "certify.references",
+    "Run": "run.simulate",
+    "Status": "certify.verdict",
+    "Sublevel": "model.sets.sublevel",
+    "Submode": "graph.submodes",
+    "Switch": "graph.switch",
+    "System": "model.system",
+    "Target": "model.target",
+    "Verdict": "certify.verdict",
+    "Witness": "certify.verdict",
+    "Zonotope": "model.sets.zonotope",
+    "build": "graph.build",
+    "flowpipe": "reach.flowpipe",
+    "minimum_energy": "model.signals",
+    "minimum_time": "model.signals",
+    "quintic": "model.signals",
+    "setpoint": "model.reference",
+    "trajectory": "model.trajectory",
+}
+"""Module of each public name that is imported on first use, relative to this package."""
+
+
+def load(path: Any) -> NoReturn:
+    """Read a saved graph; not built yet."""
+    raise NotBuiltYet("load: saving and loading graphs is not built yet; build the graph from its modes")
+
+
+def largest_start(mode: Any, shape: Any, r: Any = None) -> NoReturn:
+    """Find a start set; not built yet."""
+    raise NotBuiltYet("largest_start is not built yet; give the mode a start set and check it with build")
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Supervisor":
+        raise NotBuiltYet("Supervisor is not built yet; run a plan with plan.simulate(x0)")
+    home = _HOME.get(name)
+    if home is None:
+        raise AttributeError(f"module 'modegraph' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"modegraph.{home}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

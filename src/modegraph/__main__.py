@@ -1,0 +1,6 @@
+"""``python -m modegraph``."""
+
+from modegraph.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,207 @@
+"""Validated counterexamples to condition (C): from point flowpipes and enclosed equilibria, never from samples.
+
+Kinds (method, section 4): "violates" - a constraint is broken before the target is entered; "trapped" -
+an equilibrium outside the target; "horizon" - the trajectory stays outside for as long as was asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..enclosure.rounding import UNIT
+from ..expression.evaluate import Evaluator
+from ..expression.tape import Tape
+from ..model.sets import Box, Set, is_subset
+from ..reach.field import Field
+from ..reach.flow import Flow, Order
+from ..reach.start import point
+from .region import Region
+from .verdict import Witness
+
+Floats = NDArray[np.float64]
+
+POINT_ORDER = Order(1, 0)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a counterexample needs to know about a mode: its compiled loop, starts and uncertainties."""
+
+    fields: Sequence[Field]
+    start: Set
+    plant: int
+    w_lo: Floats
+    w_hi: Floats
+    unknowns: dict[str, tuple[float, float]]
+    names: Sequence[str]
+    reset: Tape | None
+    stops: Sequence[float]
+
+    def disturbances(self) -> Iterator[Floats]:
+        """Constant disturbances worth trying: the centre, then the corners that matter most."""
+        q = len(self.w_lo)
+        centre = 0.5 * (self.w_lo + self.w_hi)
+        if q:
+            yield self.w_hi
+            yield self.w_lo
+            if q == 2:
+                yield np.array([self.w_hi[0], self.w_lo[1]])
+                yield np.array([self.w_lo[0], self.w_hi[1]])
+        yield np.clip(centre, self.w_lo, self.w_hi)
+
+    def constants(self) -> Floats:
+        return np.array([min(max(0.5 * (lo + hi), lo), hi) for lo, hi in self.unknowns.values()])
+
+
+class PointRun:
+    """The validated trajectory of one start, one constant disturbance and known constants."""
+
+    def __init__(self, scene: Scene, x0: Floats, w: Floats, d: Floats) -> None:
+        self.scene = scene
+        self.x0, self.w, self.d = x0, w, d
+        self.flow = Flow(
+            scene.fields,
+            point(x0, d),
+            w,
+            np.zeros(len(w)),
+            POINT_ORDER,
+            names=scene.names,
+            reset=scene.reset if len(x0) == scene.plant else None,
+            stops=scene.stops,
+        )
+        self.violation: float | None = None
+        self._seen = 0
+
+    def extend(self, horizon: float, steps: int) -> None:
+        """Integrate to the horizon (or ``steps`` steps); note the first instant of a proved violation."""
+        if self._seen == 0 and self._violated(0.0, self.flow.p0, self.flow.G0, 0):
+            self.violation = 0.0
+        while self.flow.time < horizon and len(self.flow.steps) < steps and self.violation is None:
+            if not self.flow.advance(horizon):
+                break
+            step = self.flow.steps[-1]
+            self._seen += 1
+            if not (step.face_upper <= 0.0).all() and self._violated(step.end, step.p, step.G, step.segment):
+                self.violation = step.end
+
+    def _violated(self, t: float, p: Floats, G: Floats, segment: int) -> bool:
+        fld = self.flow.fields[segment]
+        if not fld.faces:
+            return False
+        inputs, radius = self.flow.variables_at(t, p, G, fld)
+        value, off, _ = self.flow.evaluate(fld.observed, inputs, radius)
+        count = len(fld.faces)
+        return bool((-self.flow.bounds.upper(-value[:count]) - off[:count] > 0.0).any())
+
+    def apart_until(self, region: Region) -> float:
+        """The trajectory is proved to be outside the target on [0, this instant) (seconds)."""
+        if region.dim != self.scene.plant:
+            return 0.0
+        n = region.dim
+        if not self.flow.steps:
+            return 0.0
+        lo, hi = self.flow.tubes()
+        apart = region.separated(lo[:, :n], hi[:, :n])
+        touching = np.flatnonzero(~apart)
+        return float(self.flow.steps[touching[0]].start) if len(touching) else self.flow.time
+
+    def witness(self, kind: str, time: float, r_i: Floats | None, r_j: Floats | None) -> Witness:
+        names = list(self.scene.unknowns)
+        w = self.w if len(self.w) else None
+        return Witness(self.x0, w, dict(zip(names, self.d.tolist(), strict=True)), time, kind, r_i, r_j)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A box that contains exactly one equilibrium of the loop under constant w and d (Krawczyk)."""
+
+    lo: Floats
+    hi: Floats
+    w: Floats
+    d: Floats
+
+
+def enclose_equilibrium(scene: Scene, guess: Floats, w: Floats, d: Floats) -> Equilibrium | None:
+    """Newton's method in floats, then Krawczyk's operator in validated arithmetic.
+
+    K = x - Y f(x) + (I - Y J(X)) (X - x) strictly inside X proves a zero of f in X.
+    """
+    fld = scene.fields[-1]
+    n = fld.states
+    if len(scene.fields) != 1 or not fld.autonomous:
+        return None
+    rates, slopes = Evaluator(fld.rates), Evaluator(fld.jacobian)
+
+    def inputs(x: Floats) -> Floats:
+        return np.concatenate([x, [0.0], w, d])
+
+    x = guess.copy()
+    for _ in range(20):
+        f = rates(inputs(x)[:, None])[:, 0]
+        J = slopes(inputs(x)[:, None])[: n * n, 0].reshape(n, n)
+        try:
+            step = np.linalg.solve(J, -f)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(step).all():
+            return None
+        x = x + step
+        if np.abs(step).max() <= 4.0 * UNIT * (1.0 + np.abs(x).max()):
+            break
+    else:
+        return None
+    flow = Flow(scene.fields, point(x, d), w, np.zeros(len(w)), POINT_ORDER, names=scene.names)
+    Y = np.linalg.inv(slopes(inputs(x)[:, None])[: n * n, 0].reshape(n, n))
+    at = inputs(x)[:, None] * np.ones((1, flow.table.size))
+    at[:, 1:] = 0.0
+    value, off, _ = flow.evaluate(fld.rates, at, np.zeros(len(at)))
+    for size in (1e-12, 1e-10, 1e-8):
+        radius = size * (1.0 + np.abs(x))
+        spread = np.zeros(len(at))
+        spread[:n] = radius
+        slope, slope_off, _ = flow.evaluate(fld.jacobian, at, spread)
+        if not np.isfinite(slope_off).all():
+            continue
+        J = slope[: n * n, 0].reshape(n, n)
+        dJ = slope_off[: n * n].reshape(n, n)
+        move = np.abs(Y) @ (np.abs(value[:, 0]) + off)
+        rest = np.abs(np.eye(n) - Y @ J) + np.abs(Y) @ dJ + 4.0 * (n + 4) * UNIT * (np.abs(Y) @ np.abs(J) + 1.0)
+        need = (move + rest @ radius) * (1.0 + 8.0 * (n + 4) * UNIT)
+        if (need < radius).all():
+            return Equilibrium(np.nextafter(x - radius, -np.inf), np.nextafter(x + radius, np.inf), w, d)
+    return None
+
+
+def trapped_in(scene: Scene, found: Equilibrium, region: Region) -> bool:
+    """The equilibrium is a start of the mode and lies outside the target: it stays there for ever."""
+    n = scene.plant
+    if scene.start.dim != len(found.lo) or scene.reset is not None:
+        return False
+    if region.dim != n:
+        return False
+    box = Box(found.lo, found.hi)
+    outside = region.separated(found.lo[None, : region.dim], found.hi[None, : region.dim])
+    return bool(outside[0]) and is_subset(box, scene.start)
+
+
+def candidate_starts(scene: Scene, hints: Sequence[Floats]) -> list[Floats]:
+    """Points proved to lie in the start set: hints moved inside, the centre, and extreme ones."""
+    centre = np.asarray(scene.start.center, float)
+    found: list[Floats] = []
+    for hint in [*hints, centre]:
+        x = hint
+        for shrink in (0.0, 1e-12, 1e-6, 1e-3, 0.05):
+            y = centre + (x - centre) * (1.0 - shrink)
+            if scene.start.contains(y):
+                found.append(y)
+                break
+    unique: list[Floats] = []
+    for x in found:
+        if not any(np.array_equal(x, y) for y in unique):
+            unique.append(x)
+    return unique
+

@@ -1,0 +1,307 @@
+"""Flowpipes of the parts of one start set, cut as far as the questions need."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..expression.evaluate import Evaluator
+from ..expression.tape import Tape
+from ..reach.field import Field
+from ..reach.flow import Flow, Order
+from ..reach.start import Piece
+from ..reach.tail import Tail, TailSearch
+from .crossing import Missed, Reach, find_crossings, proved_instants, sample_powers, widest_variable
+from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
+from .region import Region
+
+Floats = NDArray[np.float64]
+
+MOST_PARTS = 48
+DEEPEST_CUT = 7
+LONGEST = 1000.0
+"""Seconds of flow after which a mode without horizon and without a tail is given up."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One target as the exploration sees it."""
+
+    region: Region
+    reset: Tape | None
+
+
+@dataclass
+class Findings:
+    """What one part of the starts showed: a proof or the best miss for each goal, and for the check."""
+
+    proofs: dict[int, SwitchProof] = field(default_factory=dict)
+    missed: dict[int, Missed] = field(default_factory=dict)
+    safety: SafetyProof | None = None
+    safe_until: float = 0.0
+    tail_reason: str = ""
+    failure: str = ""
+    unproved: str = ""
+    broken: bool = False
+    """A sampled start really breaks a constraint: smaller parts cannot help."""
+    flow: Flow | None = None
+
+
+class Exploration:
+    """Parts, orders and budgets of one (mode, reference)."""
+
+    def __init__(
+        self,
+        fields: Sequence[Field],
+        goals: Sequence[Goal],
+        *,
+        plant: int,
+        w: tuple[Floats, Floats],
+        names: Sequence[str],
+        reset: Tape | None,
+        horizon: float | None,
+        stops: Sequence[float],
+        deadline: float,
+        tick: Callable[[str], None],
+    ) -> None:
+        self.fields, self.goals, self.plant = fields, goals, plant
+        self.w_centre, self.w_radius = w
+        self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
+        self.deadline, self.tick = deadline, tick
+        self.parts = 0
+        self.linear = all(f.linear for f in fields)
+
+    # -- orders ----------------------------------------------------------------------------------
+
+    def order(self, piece: Piece, effort: int) -> Order:
+        """Degrees for a piece: linear loops need 1; more effort, higher degree, as memory allows."""
+        m = piece.variables
+        if self.linear or m == 0:
+            return Order(1, 0)
+        degree = 4 + effort
+        while degree > 3 and _count(m, degree) > 1300:
+            degree -= 1
+        return Order(degree, min(2, degree - 1))
+
+    # -- one part --------------------------------------------------------------------------------
+
+    def explore(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0) -> Findings:
+        """Decide the wanted goals (and the check) on one part, cutting it where that helps."""
+        self.parts += 1
+        found = self._run(piece, wanted, safety, effort)
+        left = [j for j in wanted if j not in found.proofs]
+        again, check_again = self._worth_refining(found, left, safety)
+        done = not again and not check_again
+        if done or time.monotonic() > self.deadline or self.parts >= MOST_PARTS:
+            return found
+        if found.failure and effort == 0 and not self.linear and _count(piece.variables, 6) <= 400:
+            better = self.explore(piece, again, check_again, effort=2)
+            return _merge(found, [better], again, check_again)
+        if piece.depth >= DEEPEST_CUT or piece.variables == 0:
+            return found
+        flow = found.flow
+        assert flow is not None
+        variable = nonlinear_variable(flow) if found.failure else widest_variable(flow.bounds, flow.set_at(0)[0])
+        children = [self.explore(child, again, check_again, effort) for child in piece.split(variable)]
+        return _merge(found, children, again, check_again)
+
+    def _worth_refining(self, found: Findings, left: Sequence[int], safety: bool) -> tuple[list[int], bool]:
+        """Goals for which smaller parts may succeed, and whether the check may."""
+        hopeful = {j for j in left if found.missed[j].hopeful}
+        if found.broken:
+            return sorted(hopeful), False
+        cut_short = bool(found.failure or found.unproved)
+        if cut_short:
+            hopeful |= {j for j in left if found.missed[j].gauge < 3.0}
+        return sorted(hopeful), safety and found.safety is None and cut_short
+
+    def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int) -> Findings:
+        flow = Flow(
+            self.fields, piece, self.w_centre, self.w_radius, self.order(piece, effort),
+            names=self.names, reset=self.reset, stops=self.stops,
+        )  # fmt: skip
+        last = self.fields[-1]
+        search = TailSearch(last, piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order(piece))
+        end = LONGEST if self.horizon is None else self.horizon
+        tail: Tail | None = None
+        tail_reason = ""
+        previous = {j: np.inf for j in wanted}
+        pending = list(wanted)
+        checkpoint = 8
+        while flow.time < end and time.monotonic() < self.deadline:
+            if not flow.advance(end):
+                break
+            if not (flow.steps[-1].face_upper <= 0.0).all():
+                # Nothing later can be used for a switch; the check has failed on this part.
+                break
+            if len(flow.steps) < checkpoint and flow.time < end:
+                continue
+            checkpoint = int(len(flow.steps) * 1.25) + 4
+            self.tick(f"t = {flow.time:.3g} s")
+            if tail is None and flow.time >= last.start:
+                outcome = search.attempt([flow])
+                if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
+                    tail = outcome
+                else:
+                    tail_reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
+            now = {j: self._gauge_now(flow, j) for j in pending}
+            pending = [j for j in pending if not now[j] <= 1.0]
+            if not pending and (tail is not None or not safety):
+                break
+            if tail is not None and all(now[j] > 0.98 * previous[j] for j in pending):
+                break
+            previous = {j: now[j] for j in pending}
+        return self._findings(flow, wanted, tail, tail_reason, safety, end)
+
+    def _tail_order(self, piece: Piece) -> Order:
+        return Order(1, 0) if self.linear else Order(3, 2)
+
+    def _gauge_now(self, flow: Flow, j: int) -> float:
+        goal = self.goals[j]
+        if goal.reset is not None:
+            return np.inf
+        p, G = flow.set_at(len(flow.steps))
+        n = goal.region.dim
+        return float(goal.region.gauges(flow.bounds, p[None, :n], [G[:, :n]])[0])
+
+    def _findings(
+        self, flow: Flow, wanted: Sequence[int], tail: Tail | None, tail_reason: str, safety: bool, end: float
+    ) -> Findings:
+        found = Findings(flow=flow, tail_reason=tail_reason)
+        proved = proved_instants(flow)
+        times = flow.times
+        if flow.failure is not None:
+            found.failure = str(flow.failure)
+        if proved < len(flow.steps):
+            found.unproved = self._unproved(flow, proved)
+            found.broken = sampled_violation(flow)
+        found.safe_until = float(times[proved]) if proved >= 0 else 0.0
+        for j in wanted:
+            goal = self.goals[j]
+            reach = Reach(flow, self.horizon, goal.reset)
+            outcome = find_crossings(reach, goal.region)
+            if isinstance(outcome, Missed):
+                found.missed[j] = outcome
+                continue
+            latest = max(c.instant for c in outcome)
+            found.proofs[j] = SwitchProof(
+                earliest=min(reach.earliest(goal.region, self.plant), min(c.time for c in outcome)),
+                latest=max(c.time for c in outcome),
+                margin=min(1.0 - c.best for c in outcome),
+                window=min(c.window for c in outcome),
+                energy=max(c.energy for c in outcome),
+                slack=slack_until(flow, latest),
+                parts=len(outcome),
+            )
+        if safety and proved == len(flow.steps) and flow.failure is None:
+            found.safety = self._safety(flow, tail)
+        return found
+
+    def _safety(self, flow: Flow, tail: Tail | None) -> SafetyProof | None:
+        if tail is None:
+            if self.linear and not flow.fields[-1].faces and flow.time >= flow.fields[-1].start:
+                # A linear loop has a solution for all time, and there is nothing else to prove.
+                return SafetyProof({}, flow.time, np.full(flow.fields[-1].outputs, np.inf))
+            return None
+        last = flow.fields[-1]
+        after = {}
+        for name, upper in zip(last.faces, tail.face_upper, strict=True):
+            after[name] = min(-float(upper), after.get(name, np.inf))
+        tracking = np.max([tail.tracking, *(s.tracking for s in flow.steps)], axis=0)
+        slack = least_slack([slack_until(flow, len(flow.steps)), after])
+        return SafetyProof(slack, tail.start, tracking)
+
+    def _unproved(self, flow: Flow, proved: int) -> str:
+        if proved < 0:
+            upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, 0)
+            names = flow.fields[0].faces
+            when = "at t = 0"
+        else:
+            step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
+            upper, names = step.face_upper, flow.fields[step.segment].faces
+            when = f"after t = {step.start:.4g} s"
+        if not len(upper):
+            return ""
+        k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
+        by = f"exceeded by up to {upper[k]:.3g}" if np.isfinite(upper[k]) else "not defined on the whole set"
+        return f"constraint '{names[k]}' cannot be proved {when} ({by})"
+
+
+def _count(m: int, degree: int) -> int:
+    count = 1
+    for k in range(1, degree + 1):
+        count = count * (m + k) // k
+    return count
+
+
+def slack_until(flow: Flow, instant: int) -> dict[str, float]:
+    """Proved slack of every constraint on [0, times[instant]]."""
+    many: list[dict[str, float]] = []
+    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, 0)
+    many.append(_by_name(flow.fields[0].faces, upper))
+    for step in flow.steps[:instant]:
+        many.append(_by_name(flow.fields[step.segment].faces, step.face_upper))
+    return least_slack(many)
+
+
+def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
+    out: dict[str, float] = {}
+    for name, value in zip(names, upper, strict=True):
+        out[name] = min(-float(value), out.get(name, np.inf))
+    return out
+
+
+def nonlinear_variable(flow: Flow) -> int:
+    """The variable with the largest share in the nonlinear terms early in the flow."""
+    k = max(1, len(flow.steps) // 3) if flow.steps else 0
+    p, _ = flow.set_at(k)
+    exponents = flow.bounds.exponents
+    weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
+    degree = exponents.sum(axis=1)
+    share = np.zeros(flow.piece.variables)
+    for v in range(len(share)):
+        uses = (exponents[:, v] > 0) & (degree > 1)
+        share[v] = float((np.abs(p[:, uses]) * exponents[uses, v]).sum(axis=1) @ weight)
+    if not share.any():
+        return widest_variable(flow.bounds, p)
+    return int(np.argmax(share))
+
+
+def sampled_violation(flow: Flow) -> bool:
+    """Whether a sampled trajectory breaks a constraint at the end of the flow (floats: a guess)."""
+    fld = flow.fields[flow.steps[-1].segment if flow.steps else 0]
+    if not fld.faces:
+        return False
+    p, G = flow.set_at(len(flow.steps))
+    powers = sample_powers(flow.piece, flow.bounds.exponents)
+    inputs, _ = flow.variables_at(flow.time, p, G, fld)
+    faces = Evaluator(fld.observed)(inputs @ powers.T)[: len(fld.faces)]
+    return bool((faces > 0.0).any())
+
+
+def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:
+    """What the parts prove together is proved of the whole."""
+    for j in wanted:
+        if j in found.proofs:
+            continue
+        proof = together([part.proofs.get(j) for part in parts])
+        if proof is not None:
+            found.proofs[j] = proof
+            found.missed.pop(j, None)
+        else:
+            missed = [part.missed[j] for part in parts if j in part.missed]
+            if missed:
+                found.missed[j] = max(missed, key=lambda m: m.gauge)
+    if safety:
+        found.safety = safe_together([part.safety for part in parts])
+        if found.safety is None:
+            found.safe_until = max(found.safe_until, min(part.safe_until for part in parts))
+    if all(not part.failure for part in parts):
+        found.failure = ""
+    if all(not part.unproved for part in parts):
+        found.unproved = ""
+    return found

@@ -1,0 +1,397 @@
+"""One unit of work: one mode under one reference against all its targets (method, section 2)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ModegraphError
+from ..expression.tape import Tape, compile_tape
+from ..model.closed_loop import ClosedLoop, close_loop, mode_start
+from ..model.mode import Mode
+from ..model.sets import Set, is_subset
+from ..model.target import Target
+from ..reach.field import Field, compile_field, disturbance_box
+from ..reach.flow import Flow, Order
+from ..reach.start import Piece, whole
+from ..reach.tail import Tail, TailSearch
+from .counterexample import Equilibrium, PointRun, Scene, candidate_starts, enclose_equilibrium, trapped_in
+from .exploration import Exploration, Findings, Goal, slack_until
+from .proof import SwitchProof, certified_check, certified_switch
+from .region import Region
+from .verdict import Floats, Status, Verdict, Witness
+
+POINT_STEPS = 3000
+"""Longest validated trajectory tried as a counterexample, in steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class TargetSpec:
+    """A target of a unit: a mode under the reference p, or a `Target`."""
+
+    name: str
+    p: Floats | None
+    mode: Mode | Target
+
+
+@dataclass(frozen=True)
+class UnitResult:
+    """Verdicts parallel to the targets, and that of Assumption 1."""
+
+    verdicts: list[Verdict]
+    check: Verdict
+
+
+@dataclass(frozen=True)
+class CompiledMode:
+    """A mode under one reference, ready for the engine."""
+
+    loop: ClosedLoop
+    fields: list[Field]
+    start: Set
+    reset: Tape | None
+    w_centre: Floats
+    w_radius: Floats
+    unknowns: dict[str, tuple[float, float]]
+    stops: list[float]
+
+    @property
+    def plant(self) -> int:
+        return len(self.loop.states) - len(self.loop.reset)
+
+    def whole(self) -> Piece:
+        return whole(self.start, list(self.unknowns.values()))
+
+    @property
+    def own_reset(self) -> Tape | None:
+        """The reset to apply to the start set; None where the set already holds the memory."""
+        return self.reset if self.start.dim == self.plant else None
+
+
+def compile_reset(loop: ClosedLoop) -> Tape | None:
+    """The memory on entry as a function of the plant states."""
+    if not loop.reset:
+        return None
+    return compile_tape(loop.reset, loop.states[: len(loop.states) - len(loop.reset)])
+
+
+def compile_mode(mode: Mode, p: Floats | None, start: Set | None = None) -> CompiledMode:
+    """Trace and compile a mode; raises `ModegraphError` where the model is wrong."""
+    loop = close_loop(mode, p)
+    centre, radius = disturbance_box(loop, mode.system.disturbance)
+    unknowns = {name: (float(lo), float(hi)) for name, (lo, hi) in (mode.system.unknowns or {}).items()}
+    return CompiledMode(
+        loop=loop,
+        fields=[compile_field(loop, segment) for segment in loop.segments],
+        start=mode_start(mode, p) if start is None else start,
+        reset=compile_reset(loop),
+        w_centre=centre,
+        w_radius=radius,
+        unknowns=unknowns,
+        stops=[],
+    )
+
+
+def certify_unit(
+    mode: Mode,
+    p: Floats | None,
+    targets: Sequence[TargetSpec],
+    *,
+    horizon: float | None,
+    deadline: float,
+    progress: Callable[[str], None] | None = None,
+) -> UnitResult:
+    """Decide condition (C) for every target, and Assumption 1, from the flowpipe of one mode.
+
+    Parameters
+    ----------
+    horizon : seconds a switch may take; None: until a tail is certified or the deadline.
+    deadline : instant of ``time.monotonic()`` after which what is not decided is UNDECIDED.
+    """
+    compiled = compile_mode(mode, p)
+    return _Unit(mode, p, compiled, targets, horizon, deadline, progress or (lambda text: None)).run()
+
+
+class _Unit:
+    def __init__(
+        self,
+        mode: Mode,
+        p: Floats | None,
+        compiled: CompiledMode,
+        targets: Sequence[TargetSpec],
+        horizon: float | None,
+        deadline: float,
+        tick: Callable[[str], None],
+    ) -> None:
+        self.mode, self.p, self.compiled = mode, p, compiled
+        self.targets, self.horizon, self.deadline, self.tick = targets, horizon, deadline, tick
+        self.verdicts: dict[int, Verdict] = {}
+        self.goals: dict[int, Goal] = {}
+        self.runs: list[PointRun] = []
+        self.check: Verdict | None = None
+
+    def run(self) -> UnitResult:
+        for k, spec in enumerate(self.targets):
+            try:
+                self.goals[k] = self._goal(spec)
+            except ModegraphError as error:
+                self.verdicts[k] = Verdict(Status.UNDECIDED, str(error), horizon=self.horizon)
+        try:
+            self._prove()
+        except ModegraphError as error:
+            # A limit of the engine, not of the model: that was checked when the mode was compiled.
+            self.check = self.check or Verdict(Status.UNDECIDED, str(error))
+            for k in range(len(self.targets)):
+                self.verdicts.setdefault(k, Verdict(Status.UNDECIDED, str(error), horizon=self.horizon))
+        assert self.check is not None
+        return UnitResult([self.verdicts[k] for k in range(len(self.targets))], self.check)
+
+    def _goal(self, spec: TargetSpec) -> Goal:
+        if isinstance(spec.mode, Target):
+            return Goal(Region(spec.mode.set), None)
+        target = mode_start(spec.mode, spec.p)
+        reset = None
+        if target.dim > self.compiled.plant:
+            reset = compile_reset(close_loop(spec.mode, spec.p))
+        return Goal(Region(target), reset)
+
+    # -- proofs ----------------------------------------------------------------------------------
+
+    def _prove(self) -> None:
+        compiled = self.compiled
+        exploration = Exploration(
+            compiled.fields,
+            [self.goals.get(k) for k in range(len(self.targets))],
+            plant=compiled.plant,
+            w=(compiled.w_centre, compiled.w_radius),
+            names=compiled.loop.names,
+            reset=compiled.own_reset,
+            horizon=self.horizon,
+            stops=compiled.stops,
+            deadline=self.deadline,
+            tick=self.tick,
+        )
+        self._switches_in_zero_time()
+        wanted = [k for k in self.goals if k not in self.verdicts]
+        found = exploration.explore(compiled.whole(), wanted, safety=True)
+        for k in wanted:
+            if k in found.proofs:
+                self.verdicts[k] = certified_switch(found.proofs[k], self.horizon)
+        if found.safety is not None:
+            self.check = certified_check(found.safety)
+        self._refute(found)
+        for k in wanted:
+            if k not in self.verdicts:
+                self.verdicts[k] = self._undecided(found, k)
+        if self.check is None:
+            self.check = self._unchecked(found)
+
+    def _switches_in_zero_time(self) -> None:
+        """S_i inside S_j, decided exactly, with the constraints proved at t = 0."""
+        compiled = self.compiled
+        if compiled.start.dim != compiled.plant:
+            return
+        candidates = [
+            k for k, goal in self.goals.items()
+            if goal.region.dim == compiled.plant and is_subset(compiled.start, goal.region.set)
+        ]  # fmt: skip
+        if not candidates:
+            return
+        flow = Flow(
+            compiled.fields, compiled.whole(), compiled.w_centre, compiled.w_radius,
+            Order(1, 0) if all(f.linear for f in compiled.fields) else Order(4, 2),
+            names=compiled.loop.names, reset=compiled.own_reset,
+        )  # fmt: skip
+        if flow.failure is not None or not (flow.faces_at(0.0, flow.p0, flow.G0, 0) <= 0.0).all():
+            return
+        slack = slack_until(flow, 0)
+        for k in candidates:
+            gauge = float(self.goals[k].region.gauges(flow.bounds, flow.p0[None, : compiled.plant], [flow.G0])[0])
+            proof = SwitchProof(0.0, 0.0, max(0.0, 1.0 - gauge), 0.0, 0.0, slack, 1)
+            self.verdicts[k] = certified_switch(proof, self.horizon)
+
+    # -- counterexamples -------------------------------------------------------------------------
+
+    def _scene(self) -> Scene:
+        compiled = self.compiled
+        box = self.mode.system.disturbance
+        return Scene(
+            fields=compiled.fields,
+            start=compiled.start,
+            plant=compiled.plant,
+            w_lo=np.zeros(0) if box is None else np.asarray(box.lo, float),
+            w_hi=np.zeros(0) if box is None else np.asarray(box.hi, float),
+            unknowns=compiled.unknowns,
+            names=compiled.loop.names,
+            reset=compiled.own_reset,
+            stops=compiled.stops,
+        )
+
+    def _refute(self, found: Findings) -> None:
+        """Try to refute what is left: equilibria first (one serves all targets), then trajectories."""
+        left = [k for k in self.goals if k not in self.verdicts]
+        if not left and self.check is not None:
+            return
+        scene = self._scene()
+        d = scene.constants()
+        flow = found.flow
+        assert flow is not None
+        if left and len(scene.fields) == 1 and scene.reset is None:
+            guess = flow.set_at(len(flow.steps))[0][:, 0]
+            for w in scene.disturbances():
+                left = self._trap(scene, enclose_equilibrium(scene, guess, w, d), left)
+                if not left:
+                    break
+        if not left and self.check is not None:
+            return
+        starts = candidate_starts(scene, self._hints(found, left))
+        for w in scene.disturbances():
+            for x0 in starts[:4]:
+                if (not left and self.check is not None) or time.monotonic() > self.deadline:
+                    return
+                left = self._try_run(PointRun(scene, x0, w, d), left)
+
+    def _hints(self, found: Findings, left: Sequence[int]) -> list[Floats]:
+        """Worst starts met by the exploration, then extreme points of the start set."""
+        chart = found.flow.piece.chart if found.flow is not None else None
+        hints: list[Floats] = []
+        if chart is None:
+            return hints
+        for k in left:
+            missed = found.missed.get(k)
+            if missed is not None and len(missed.start) >= chart.free:
+                hints.append(chart.centre + chart.axes @ missed.start[: chart.free])
+        for v in range(chart.free):
+            hints += [chart.centre + chart.axes[:, v], chart.centre - chart.axes[:, v]]
+        return hints[:6]
+
+    def _trap(self, scene: Scene, equilibrium: Equilibrium | None, left: list[int]) -> list[int]:
+        if equilibrium is None:
+            return left
+        x0 = 0.5 * (equilibrium.lo + equilibrium.hi)
+        for k in list(left):
+            if trapped_in(scene, equilibrium, self.goals[k].region):
+                w = equilibrium.w if len(equilibrium.w) else None
+                names = dict(zip(scene.unknowns, equilibrium.d.tolist(), strict=True))
+                witness = Witness(x0, w, names, 0.0, "trapped", self.p, self.targets[k].p)
+                reason = (
+                    f"the equilibrium near {_short(x0)}{_under(w)} is a start of '{self.mode.name}' and lies outside "
+                    f"the target: that trajectory never reaches it"
+                )
+                self.verdicts[k] = Verdict(Status.REFUTED, reason, witness=witness, horizon=None)
+                left.remove(k)
+        return left
+
+    def _try_run(self, run: PointRun, left: list[int]) -> list[int]:
+        tail: Tail | None = None
+        search: TailSearch | None = None
+        last = run.flow.fields[-1]
+        order = Order(1, 0) if last.linear else Order(3, 2)
+        end = 200.0 if self.horizon is None else self.horizon
+        checkpoint = 30
+        while run.violation is None and run.flow.time < end and len(run.flow.steps) < POINT_STEPS:
+            if time.monotonic() > self.deadline:
+                break
+            before = len(run.flow.steps)
+            run.extend(end, checkpoint)
+            if len(run.flow.steps) == before:
+                break
+            if len(run.flow.steps) < checkpoint:
+                continue
+            checkpoint = 2 * checkpoint
+            if not any(run.apart_until(self.goals[k].region) >= run.flow.time for k in left):
+                if self.check is not None:
+                    break
+                continue
+            if run.flow.time >= last.start:
+                search = search or TailSearch(
+                    last, run.flow.piece.chart, run.w, np.zeros(len(run.w)), self.compiled.loop.names, order
+                )
+                outcome = search.attempt([run.flow])
+                if isinstance(outcome, Tail):
+                    tail = outcome
+                    break
+        return self._judge(run, tail, left)
+
+    def _judge(self, run: PointRun, tail: Tail | None, left: list[int]) -> list[int]:
+        x0 = _short(run.x0)
+        under = _under(run.w if len(run.w) else None)
+        if self.check is None and run.violation is not None:
+            witness = run.witness("violates", run.violation, self.p, None)
+            reason = f"the start {x0}{under} violates the constraints at t = {run.violation:.4g} s"
+            self.check = Verdict(Status.REFUTED, reason, witness=witness)
+        for k in list(left):
+            region = self.goals[k].region
+            apart = run.apart_until(region)
+            at = self.targets[k].p
+            verdict: Verdict | None = None
+            if run.violation is not None and (run.violation == 0.0 or apart >= run.violation):
+                witness = run.witness("violates", run.violation, self.p, at)
+                reason = (
+                    f"the start {x0}{under} violates the constraints at t = {run.violation:.4g} s, "
+                    "before it has entered the target"
+                )
+                verdict = Verdict(Status.REFUTED, reason, witness=witness)
+            elif tail is not None and apart >= run.flow.time and self._outside(region, tail):
+                witness = run.witness("trapped", tail.start, self.p, at)
+                reason = f"the start {x0}{under} never reaches the target: it is trapped outside from t = {tail.start:.4g} s"
+                verdict = Verdict(Status.REFUTED, reason, witness=witness)
+            elif self.horizon is not None and run.violation is None and apart >= self.horizon:
+                witness = run.witness("horizon", self.horizon, self.p, at)
+                reason = f"the start {x0}{under} stays outside the target up to the horizon of {self.horizon:g} s (this horizon only)"
+                verdict = Verdict(Status.REFUTED, reason, witness=witness, horizon=self.horizon)
+            if verdict is not None:
+                self.verdicts[k] = verdict
+                left.remove(k)
+        return left
+
+    def _outside(self, region: Region, tail: Tail) -> bool:
+        n = region.dim
+        if n != self.compiled.plant:
+            return False
+        lo, hi = tail.lo[:n], tail.hi[:n]
+        with np.errstate(invalid="ignore"):
+            return bool(np.isfinite(lo).all() and np.isfinite(hi).all() and region.separated(lo[None], hi[None])[0])
+
+    # -- what is left ----------------------------------------------------------------------------
+
+    def _undecided(self, found: Findings, k: int) -> Verdict:
+        missed = found.missed.get(k)
+        parts = []
+        margin = None
+        if missed is not None and np.isfinite(missed.gauge):
+            margin = 1.0 - missed.gauge
+            parts.append(
+                f"no common time was found: at best (t = {missed.time:.4g} s) the worst part of the starts "
+                f"reaches {missed.gauge:.3g} times the size of the target (1 is needed)"
+            )
+        if found.unproved:
+            parts.append(found.unproved)
+        if found.failure:
+            parts.append("the flowpipe ends " + found.failure)
+        if time.monotonic() > self.deadline:
+            parts.append("the budget ended; try a larger budget=")
+        elif missed is not None and not parts:
+            parts.append("the constraints are not proved at t = 0")
+        if missed is not None and missed.gauge < 1.5 and not found.failure:
+            parts.append("a smaller start set or a slightly larger target would help")
+        return Verdict(Status.UNDECIDED, "; ".join(parts), margin=margin, horizon=self.horizon)
+
+    def _unchecked(self, found: Findings) -> Verdict:
+        parts = [text for text in (found.unproved, found.failure and "the flowpipe ends " + found.failure) if text]
+        if not parts:
+            tail = found.tail_reason or "no invariant set was tried"
+            parts = [f"constraints proved until t = {found.safe_until:.4g} s, but not for all time: {tail}"]
+        return Verdict(Status.UNDECIDED, "; ".join(parts), until=found.safe_until)
+
+
+def _short(x: Floats) -> str:
+    return "(" + ", ".join(f"{v:.4g}" for v in x) + ")"
+
+
+def _under(w: Floats | None) -> str:
+    return "" if w is None else f" under the constant disturbance {_short(w)}"
+

@@ -1,0 +1,95 @@
+"""The three answers to condition (C) and what comes with them (method, section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Status(Enum):
+    """Outcome of a proof attempt. Only ``CERTIFIED`` may become an edge of the graph."""
+
+    CERTIFIED = "certified"
+    REFUTED = "refuted"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A validated counterexample to condition (C).
+
+    Attributes
+    ----------
+    x0 : (n,) or (n + k,) array
+        A start proved to lie in the start set.
+    w : (q,) array or None
+        The constant disturbance that was applied.
+    d : dict[str, float]
+        Values of the unknown constants.
+    r_i, r_j : array or None
+        The references of source and target.
+    time : float
+        Seconds: when a constraint is violated ("violates"), from when on the trajectory is proved
+        trapped ("trapped"), or how long it was proved to stay outside ("horizon").
+    kind : {"violates", "trapped", "horizon"}
+        "horizon" refutes only within the horizon of the verdict.
+    """
+
+    x0: Floats
+    w: Floats | None
+    d: Mapping[str, float]
+    time: float
+    kind: Literal["violates", "trapped", "horizon"]
+    r_i: Floats | None = None
+    r_j: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One answer, with the reason and the numbers that belong to it.
+
+    Attributes
+    ----------
+    status : Status
+    reason : str
+        For a person: what was proved, or what stood in the way and what would help.
+    time : (float, float) or None
+        Certified only: seconds ``(earliest, latest)`` after entering the source mode. No trajectory
+        is in the target before ``earliest``; every one has been by ``latest``.
+    margin : float or None
+        Dimensionless: 1 - gauge of the worst piece at its best time. Negative where the proof
+        misses; None where no bound was computed.
+    slack : dict[str, float]
+        Certified distance to each constraint up to the switch, in the constraint's own unit.
+    witness : Witness or None
+        Refuted only.
+    horizon : float or None
+        Seconds up to which the pair was examined; None for all time.
+    until : float or None
+        Seconds up to which the constraints are proved, where that is less than asked for.
+    energy : float or None
+        Certified upper bound of the integral of u'u up to the switch.
+    window : float or None
+        Seconds: shortest certified stay inside the target from the switch on.
+    tracking : (m,) array or None
+        ``check`` only: certified bound of |h(x) - r| over the proved time, per output.
+    """
+
+    status: Status
+    reason: str
+    time: tuple[float, float] | None = None
+    margin: float | None = None
+    slack: Mapping[str, float] = field(default_factory=dict)
+    witness: Witness | None = None
+    horizon: float | None = None
+    until: float | None = None
+    energy: float | None = None
+    window: float | None = None
+    tracking: Floats | None = None

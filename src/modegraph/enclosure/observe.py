@@ -1,0 +1,125 @@
+"""Other functions of the state along a step: constraints, input energy, outputs (numba)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .jets import solve_in_time
+from .polynomial import KERNEL
+from .remainder import coefficient_norms, remainders
+from .rounding import TINY, UNIT, UP
+from .step import truncate_inputs
+from .variational import chord_distance
+
+
+@njit(**KERNEL)
+def observe_step(
+    fP, fdg, fnorms, fvariables, ops, const, const_rad, outputs, variables, radius, h, KQ, cut, pairs,
+    Q, dq, nQ, RQ, kinks, ranges, product, offset, start, degree,
+):  # fmt: skip
+    """Evaluate a tape along the step just taken, for inputs within ``radius`` of their polynomials.
+
+    Returns, per output: its polynomial at s = 0 and at s = 1, its mean over the step (each (no, Nq)),
+    and ``slack`` (no, 2): what the true value may exceed the larger of the two ends by at any s, and
+    the radius around the mean of the true mean. Infinite where the output is undefined.
+    """
+    count = outputs.size
+    q = cut[0]
+    Nq = Q.shape[2]
+    lost = np.zeros(variables.size)
+    embed = np.arange(Nq)
+    truncate_inputs(fP, fdg, fnorms, fvariables, Q, dq, variables, KQ, q, embed, start, lost)
+    for v in range(variables.size):
+        RQ[variables[v]] = (lost[v] + radius[v]) * UP
+    for r in range(ranges.shape[0]):
+        ranges[r, 0] = np.nan
+        ranges[r, 1] = np.nan
+    for attempt in range(2):
+        solve_in_time(
+            ops, const, kinks, ranges, outputs, variables, 0, Q, dq, h, KQ, cut, product, offset, start, degree
+        )
+        coefficient_norms(Q, dq, nQ, start)
+        remainders(
+            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree
+        )
+        crossing = False
+        for r in range(ops.shape[0]):
+            if ranges[r, 0] < 0.0 < ranges[r, 1]:
+                crossing = True
+        if not crossing:
+            break
+    ends = np.zeros((3, count, Nq))
+    slack = np.zeros((count, 2))
+    for i in range(count):
+        o = outputs[i]
+        e = 0.0
+        for k in range(Nq):
+            last = 0.0
+            mean = 0.0
+            for j in range(KQ, -1, -1):
+                x = Q[o, j, k]
+                last += x
+                mean += x / (j + 1)
+                e += abs(x)
+            ends[0, i, k] = Q[o, 0, k]
+            ends[1, i, k] = last
+            ends[2, i, k] = mean
+        rounding = 1.01 * (KQ + 3) * UNIT * e
+        bend = 0.0
+        for j in range(2, KQ + 1):
+            for d in range(nQ.shape[2]):
+                bend += chord_distance(j) * nQ[o, j, d]
+        slack[i, 0] = (bend + RQ[o] + rounding) * UP + TINY
+        slack[i, 1] = (RQ[o] + rounding) * UP + TINY
+        if not RQ[o] < np.inf:
+            slack[i, 0] = np.inf
+            slack[i, 1] = np.inf
+    return ends, slack
+
+
+@njit(**KERNEL)
+def enclose_at(
+    ops, const, const_rad, outputs, variables, p, radius, cut, pairs,
+    Q, dq, nQ, RQ, kinks, ranges, product, offset, start, degree,
+):  # fmt: skip
+    """Evaluate a tape at one instant: inputs within ``radius`` of the polynomials p (nv, N).
+
+    Returns the outputs' polynomials (no, N), their radii (no,) (inf: undefined) and the first
+    undefined node or -1.
+    """
+    count = outputs.size
+    for v in range(variables.size):
+        b = variables[v]
+        Q[b] = 0.0
+        top = -1
+        for k in range(p.shape[1]):
+            Q[b, 0, k] = p[v, k]
+            if p[v, k] != 0.0:
+                top = max(top, degree[k])
+        dq[b, 0] = top
+        RQ[b] = radius[v]
+    bad = -1
+    for r in range(ranges.shape[0]):
+        ranges[r, 0] = np.nan
+        ranges[r, 1] = np.nan
+    for attempt in range(2):
+        solve_in_time(
+            ops, const, kinks, ranges, outputs, variables, 0, Q, dq, 1.0, 0, cut, product, offset, start, degree
+        )
+        coefficient_norms(Q, dq, nQ, start)
+        bad = remainders(
+            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, 0, cut, pairs, product, offset, start, degree
+        )
+        crossing = False
+        for r in range(ops.shape[0]):
+            if ranges[r, 0] < 0.0 < ranges[r, 1]:
+                crossing = True
+        if not crossing:
+            break
+    out = np.zeros((count, p.shape[1]))
+    size = np.zeros(count)
+    for i in range(count):
+        out[i] = Q[outputs[i], 0]
+        size[i] = RQ[outputs[i]]
+    return out, size, bad

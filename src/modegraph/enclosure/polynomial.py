@@ -1,0 +1,62 @@
+"""Truncated products and compositions of dense polynomials (numba kernels).
+
+A polynomial is a coefficient vector over a ``Monomials`` table; its top nonzero degree travels with
+it (-1: zero) and cuts the loops.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy"}
+
+
+@njit(inline="always", **KERNEL)
+def _accumulate(c, a, da, b, db, dmax, factor, product, offset, start, degree):
+    if da > dmax:
+        da = dmax
+    for i in range(start[da + 1]):
+        x = a[i]
+        if x != 0.0:
+            x *= factor
+            d = dmax - degree[i]
+            if db < d:
+                d = db
+            o = offset[i]
+            for j in range(start[d + 1]):
+                c[product[o + j]] += x * b[j]
+
+
+@njit(**KERNEL)
+def multiply_into(c, a, da, b, db, dmax, factor, product, offset, start, degree):
+    """c += factor a b, truncated at degree dmax; da, db are the degrees of a and b."""
+    if da < 0 or db < 0:
+        return
+    if da <= db:
+        _accumulate(c, a, da, b, db, dmax, factor, product, offset, start, degree)
+    else:
+        _accumulate(c, b, db, a, da, dmax, factor, product, offset, start, degree)
+
+
+@njit(**KERNEL)
+def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
+    """c = sum_k series[k] u**k by Horner, truncated at degree dmax; u has no constant term.
+
+    Returns the degree of c.
+    """
+    if du < 1:
+        c[:] = 0.0
+        c[0] = series[0]
+        return 0
+    c[:] = 0.0
+    c[0] = series[dmax]
+    dc = 0
+    for k in range(dmax - 1, -1, -1):
+        for i in range(start[dmax + 1]):
+            work[i] = 0.0
+        multiply_into(work, c, dc, u, du, dmax, 1.0, product, offset, start, degree)
+        dc = min(dmax, dc + du)
+        for i in range(start[dc + 1]):
+            c[i] = work[i]
+        c[0] += series[k]
+    return dc

@@ -1,0 +1,292 @@
+"""What the stored Taylor coefficients miss: a rigorous remainder for every tape node (numba).
+
+``remainders`` bounds sup |true node - stored polynomial| over the step s in [0, 1], all set variables
+in [-1, 1], for inputs within given radii of their stored polynomials. It works with the norms of the
+coefficients by degree and never forms an interval polynomial.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ..expression.ops import (
+    ADD,
+    ADDC,
+    ATAN,
+    CONST,
+    COS,
+    EXP,
+    LOG,
+    MUL,
+    MULC,
+    RECIP,
+    RELU,
+    SIN,
+    SQR,
+    STEP,
+    SUB,
+    VAR,
+    WHERE,
+)
+from .elementary import taylor_coefficients, taylor_errors
+from .polynomial import KERNEL, multiply_into
+from .rounding import LIBM, TINY, UNIT, UP
+
+
+@njit(**KERNEL)
+def coefficient_norms(P, dg, norms, start):
+    """norms[q, j, d] >= sum of |coefficients| of degree d of P[q, j]."""
+    norms[:] = 0.0
+    for q in range(P.shape[0]):
+        for j in range(P.shape[1]):
+            for d in range(dg[q, j] + 1):
+                s = 0.0
+                for k in range(start[d], start[d + 1]):
+                    s += abs(P[q, j, k])
+                norms[q, j, d] = s * UP
+
+
+@njit(**KERNEL)
+def truncated_part(na, tb, ta, K, cut, in_time):
+    """L1 norm of what a product drops: powers of time above K, degrees above cut.
+
+    na (K+1, n+1) norms of a by degree; ta, tb (K+1, n+2) tail sums of a and b. With ``in_time`` it is
+    the product a' b integrated over the step: weight i / (i + j).
+    """
+    n = na.shape[1] - 1
+    r = 0.0
+    for i in range(K + 1):
+        if ta[i, 0] == 0.0 or (in_time and i == 0):
+            continue
+        for j in range(K + 1):
+            if tb[j, 0] == 0.0:
+                continue
+            w = i / (i + j) if in_time else 1.0
+            if i + j > K:
+                r += w * ta[i, 0] * tb[j, 0]
+            else:
+                for d in range(n + 1):
+                    if na[i, d] != 0.0:
+                        e = cut[i + j] + 1 - d
+                        if e < 0:
+                            e = 0
+                        if e <= n:
+                            r += w * na[i, d] * tb[j, e]
+    return r * UP
+
+
+@njit(**KERNEL)
+def composition_error(op, x, u, dmax, pairs, series, size, error, power, next_power):
+    """L1 error of the stored composition f(x + u(xi)) at the start of the step.
+
+    u[d] are the norms of the argument by degree (u[0] is ignored). Uses the one-dimensional majorant
+    U(y) = sum_d u[d] y^d: what truncation at dmax drops from u^k is U(1)^k minus the kept part.
+    """
+    r = 0.0
+    for d in range(1, u.size):
+        r += u[d]
+    r *= UP
+    taylor_coefficients(op, x, dmax, series)
+    lagrange = taylor_errors(op, x, r, dmax, series, size, error)
+    power[:] = 0.0
+    power[0] = 1.0
+    rk = 1.0
+    total = error[0]
+    rounding = size[0]
+    for k in range(1, dmax + 1):
+        rk *= r
+        next_power[:] = 0.0
+        for d in range(dmax + 1):
+            if power[d] != 0.0:
+                for e in range(1, min(dmax - d, u.size - 1) + 1):
+                    next_power[d + e] += power[d] * u[e]
+        kept = 0.0
+        for d in range(dmax + 1):
+            power[d] = next_power[d]
+            kept += next_power[d]
+        dropped = rk - kept
+        if dropped < 0.0:
+            dropped = 0.0
+        # Both terms carry fewer than MAX_ROUNDINGS roundings.
+        dropped += rk * (UP - 1.0) * 2.0
+        total += size[k] * dropped + error[k] * rk
+        rounding += size[k] * rk
+    horner = (dmax + 1) * (pairs + 3) * UNIT * 1.01
+    return (total + horner * rounding + lagrange * rk * r) * UP + TINY
+
+
+@njit(**KERNEL)
+def remainders(
+    ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start, degree
+):
+    """Fill R[q] for every node that is not a variable; R of the variables is given.
+
+    Also fills ranges[q] with the range of the argument of relu, step and where nodes. A node that
+    is undefined somewhere gets R = inf. Returns the first such node, or -1.
+
+    Without relu, step and where nodes every R is a nondecreasing convex function of the input radii
+    (sums, products and compositions of such functions): ``flow_step`` relies on that.
+    """
+    nodes = ops.shape[0]
+    n = norms.shape[2] - 1
+    bad = -1
+    tails = np.zeros((nodes, K + 1, n + 2))
+    A = np.zeros(nodes)
+    work = np.zeros(P.shape[2])
+    series = np.zeros(n + 2)
+    size = np.zeros(n + 2)
+    error = np.zeros(n + 2)
+    power = np.zeros(n + 2)
+    next_power = np.zeros(n + 2)
+    gamma = 1.01 * (pairs * (K + 1) + 8) * UNIT
+    for q in range(nodes):
+        total = 0.0
+        for j in range(K + 1):
+            for d in range(n, -1, -1):
+                tails[q, j, d] = (tails[q, j, d + 1] + norms[q, j, d]) * (1.0 + 4.0 * UNIT)
+            total += tails[q, j, 0]
+        A[q] = total * UP
+    for q in range(nodes):
+        op = ops[q, 0]
+        a = ops[q, 1]
+        b = ops[q, 2]
+        if op == VAR:
+            continue
+        if op == CONST:
+            R[q] = const_rad[q]
+            continue
+        if op == ADD or op == SUB:
+            r = R[a] + R[b] + 2.0 * UNIT * (A[a] + A[b])
+            for j in range(K + 1):
+                e = min(cut[j] + 1, n + 1)
+                r += tails[a, j, e] + tails[b, j, e]
+            R[q] = r * UP
+        elif op == MULC or op == ADDC:
+            f = abs(const[q]) if op == MULC else 1.0
+            r = 0.0
+            for j in range(K + 1):
+                r += tails[a, j, min(cut[j] + 1, n + 1)]
+            spread = const_rad[q] * ((A[a] + R[a]) if op == MULC else 1.0)
+            R[q] = (f * (R[a] + r) + spread + 2.0 * UNIT * (f * A[a] + abs(const[q]))) * UP + TINY
+        elif op == MUL:
+            lost = truncated_part(norms[a], tails[b], tails[a], K, cut, False)
+            R[q] = (A[a] * R[b] + R[a] * A[b] + R[a] * R[b] + lost + gamma * A[a] * A[b]) * UP + TINY
+        elif op == SQR:
+            lost = truncated_part(norms[a], tails[a], tails[a], K, cut, False)
+            R[q] = (2.0 * A[a] * R[a] + R[a] * R[a] + lost + gamma * A[a] * A[a]) * UP + TINY
+        elif op == SIN:
+            # E = stored - true obeys E_s' = E_c a' + d1, E_c' = -E_s a' + d2: a rotation, so
+            # |E|_2 <= |E(0)|_2 + int |d|_2 <= |E(0)|_2 + D1 + D2.
+            es = composition_error(
+                SIN, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
+            )
+            ec = composition_error(
+                COS, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
+            )
+            speed = 0.0
+            for j in range(1, K + 1):
+                speed += j * tails[a, j, 0]
+            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, True) + gamma * speed * A[b]
+            d2 = truncated_part(norms[a], tails[q], tails[a], K, cut, True) + gamma * speed * A[q]
+            R[q] = (math.sqrt(es * es + ec * ec) + d1 + d2 + R[a]) * UP + TINY
+            R[b] = R[q]
+        elif op == COS:
+            continue
+        elif op == EXP:
+            speed = 0.0
+            travel = 0.0
+            for j in range(1, K + 1):
+                speed += j * tails[a, j, 0]
+                travel += tails[a, j, 0]
+            e0 = composition_error(
+                EXP, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
+            )
+            d1 = truncated_part(norms[a], tails[q], tails[a], K, cut, True) + gamma * speed * A[q]
+            # E' = E a' + d: |E(s)| <= (|E(0)| + D) exp(a(s) - a(tau)).
+            stored = (e0 + d1) * math.exp(travel * UP) * UP
+            top = P[a, 0, 0] + (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0)))
+            lip = math.exp(top + 4.0 * UNIT * (abs(top) + A[a])) * math.expm1(R[a] * UP)
+            R[q] = (stored + lip * (1.0 + 4.0 * LIBM)) * UP + TINY
+        elif op == LOG or op == ATAN:
+            travel = 0.0
+            speed = 0.0
+            for j in range(1, K + 1):
+                travel += tails[a, j, 0]
+                speed += j * tails[a, j, 0]
+            e0 = composition_error(
+                op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
+            )
+            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, True) + gamma * speed * A[b]
+            # E' = (stored g - g) a' + d with g = 1/a or 1/(1 + a^2), whose remainder is R[b].
+            lip = R[a] if op == ATAN else R[a] * (A[b] + R[b])
+            R[q] = (e0 + d1 + R[b] * travel + lip) * UP + TINY
+            if op == LOG and not (P[a, 0, 0] > 0.0 and R[b] < np.inf):
+                R[q] = np.inf
+        elif op == RECIP:
+            # rho = |a r - 1| formed explicitly; r - 1/alpha = (a r - 1 + r (alpha - a)) / alpha.
+            rho = truncated_part(norms[a], tails[q], tails[a], K, cut, False) + gamma * A[a] * A[q]
+            for j in range(K + 1):
+                work[:] = 0.0
+                for i in range(j + 1):
+                    multiply_into(
+                        work, P[a, i], dg[a, i], P[q, j - i], dg[q, j - i], cut[j], 1.0,
+                        product, offset, start, degree,
+                    )  # fmt: skip
+                if j == 0:
+                    work[0] -= 1.0
+                s = 0.0
+                for k in range(work.size):
+                    s += abs(work[k])
+                rho += s * UP
+            miss = (rho + R[a] * A[q]) * UP
+            # |a r - 1 + r (alpha - a)| <= miss < 1 proves alpha != 0 and |1/alpha| <= A_r/(1 - miss).
+            if miss < 1.0 - 1e-9:
+                R[q] = miss * A[q] / (1.0 - miss) * UP + TINY
+            else:
+                R[q] = np.inf
+        else:
+            t = a if op != WHERE else ops[q, 3]
+            mid = P[t, 0, 0]
+            rest = (A[t] - norms[t, 0, 0] * (1.0 - 2.0 * (UP - 1.0))) * UP + R[t] * UP
+            rest += 4.0 * UNIT * (abs(mid) + rest)
+            lo = mid - rest
+            hi = mid + rest
+            ranges[q, 0] = lo
+            ranges[q, 1] = hi
+            if op == STEP:
+                r = 0.0
+                if not hi <= 0.0:
+                    r = abs(1.0 - kinks[q, 0])
+                if not lo >= 0.0:
+                    r = max(r, abs(kinks[q, 0]))
+                R[q] = r * UP if rest < np.inf else np.inf
+            elif op == RELU:
+                alpha = kinks[q, 0]
+                beta = kinks[q, 1]
+                # relu(x) - alpha x - beta is piecewise linear: extreme at lo, hi and the kink.
+                gap = max(abs(max(lo, 0.0) - alpha * lo - beta), abs(max(hi, 0.0) - alpha * hi - beta))
+                if lo < 0.0 and hi > 0.0:
+                    gap = max(gap, abs(beta))
+                if not (lo >= 0.0 and alpha == 1.0 and beta == 0.0):
+                    gap += 8.0 * UNIT * (abs(lo) + abs(hi) + abs(beta)) * (1.0 + abs(alpha))
+                r = 0.0
+                for j in range(K + 1):
+                    r += tails[a, j, min(cut[j] + 1, n + 1)]
+                if alpha == 0.0 and beta == 0.0 and hi <= 0.0:
+                    R[q] = 0.0
+                else:
+                    R[q] = (gap + abs(alpha) * (R[a] + r) + 4.0 * UNIT * (abs(alpha) * A[a] + abs(beta))) * UP
+            else:  # WHERE
+                branch = a if mid > 0.0 else b
+                r = 0.0
+                for j in range(K + 1):
+                    r += tails[branch, j, min(cut[j] + 1, n + 1)]
+                R[q] = (R[branch] + r) * UP if (lo > 0.0 or hi < 0.0) else np.inf
+        if not R[q] < np.inf:
+            R[q] = np.inf
+            if bad < 0:
+                bad = q
+    return bad

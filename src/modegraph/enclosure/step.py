@@ -1,0 +1,465 @@
+"""One validated step of a flowpipe (numba): x(t) in p(xi) + sum_g G_g(xi) zeta_g, same xi throughout.
+
+The proof of a step, in order: the defect of the Taylor polynomial p (``remainder``), the fundamental
+matrix of the Jacobian on the tube p + ebox (``variational``), a growth bound for what is left, and
+the bootstrap: the bound of e lies strictly inside ebox, so e never leaves ebox during the step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .jets import solve_in_time
+from .polynomial import KERNEL
+from .remainder import coefficient_norms, remainders
+from .rounding import TINY, UNIT, UP
+from .variational import (
+    advance_generators,
+    apply_matrix,
+    chord_distance,
+    exponential_majorant,
+    fundamental_defect,
+    fundamental_matrix,
+    growth_bound,
+    matrix_product,
+    reduce_generators,
+    spectral_radius,
+)
+
+DONE = 0
+UNDEFINED = 1
+JACOBIAN_UNDEFINED = 2
+NO_GROWTH_BOUND = 3
+NO_CONTRACTION = 4
+
+SIGMA_2 = 0.1284
+"""int_0^1 |s^2/2 - 1/6| ds = 2 / (9 sqrt(3)) = 0.12830..., rounded up."""
+
+
+@njit(**KERNEL)
+def set_variable(P, dg, v, coefficients, degree):
+    """Coefficient 0 of variable node v; the others zero."""
+    top = -1
+    P[v] = 0.0
+    dg[v, :] = -1
+    for k in range(coefficients.size):
+        P[v, 0, k] = coefficients[k]
+        if coefficients[k] != 0.0:
+            top = max(top, degree[k])
+    dg[v, 0] = top
+
+
+@njit(**KERNEL)
+def taylor_step(
+    ops, const, const_rad, outputs, variables, states, p, time_index, h, K, cut, pairs,
+    P, dg, norms, R, kinks, ranges, product, offset, start, degree,
+):  # fmt: skip
+    """Taylor polynomial of the centre dynamics over the step and its integrated defect.
+
+    Returns (defect (n,), time part of the defect (n,), first undefined node or -1).
+    """
+    n = states
+    for v in range(variables.size):
+        set_variable(P, dg, variables[v], p[v], degree)
+    if time_index >= 0:
+        P[variables[time_index], 1, 0] = h
+        dg[variables[time_index], 1] = 0
+    for q in range(ops.shape[0]):
+        ranges[q, 0] = np.nan
+        ranges[q, 1] = np.nan
+    bad = -1
+    for attempt in range(2):
+        solve_in_time(
+            ops, const, kinks, ranges, outputs, variables, n, P, dg, h, K, cut, product, offset, start, degree
+        )
+        coefficient_norms(P, dg, norms, start)
+        R[:] = 0.0
+        bad = remainders(
+            ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start,
+            degree,
+        )  # fmt: skip
+        crossing = False
+        for q in range(ops.shape[0]):
+            if ranges[q, 0] < 0.0 < ranges[q, 1]:
+                crossing = True
+        if not crossing:
+            break
+    defect = np.zeros(n)
+    in_time = np.zeros(n)
+    for i in range(n):
+        v = variables[i]
+        o = outputs[i]
+        s = 0.0
+        for j in range(K):
+            top = max(dg[o, j], dg[v, j + 1])
+            for k in range(start[top + 1]):
+                x = h * P[o, j, k]
+                s += (abs(x - (j + 1) * P[v, j + 1, k]) + 4.0 * UNIT * abs(x)) / (j + 1)
+        x = 0.0
+        for k in range(start[dg[o, K] + 1]):
+            x += abs(P[o, K, k])
+        in_time[i] = h * x / (K + 1)
+        defect[i] = (s + in_time[i] + h * R[o]) * UP + TINY
+    return defect, in_time, bad
+
+
+@njit(**KERNEL)
+def truncate_inputs(P, dg, norms, variables, Q, dq, inputs, KQ, q, embed, start, lost):
+    """Copy the variables of one tape to another, cut to degrees q and KQ; lost[v]: what is dropped.
+
+    Monomial k of P's table is monomial embed[k] of Q's; degrees are the same in both.
+    """
+    n = norms.shape[2] - 1
+    for v in range(variables.size):
+        a = variables[v]
+        b = inputs[v]
+        Q[b] = 0.0
+        s = 0.0
+        for j in range(P.shape[1]):
+            for d in range(n + 1):
+                if j > KQ or d > q:
+                    s += norms[a, j, d]
+            if j <= KQ:
+                top = min(dg[a, j], q)
+                dq[b, j] = top
+                for k in range(start[top + 1]):
+                    Q[b, j, embed[k]] = P[a, j, k]
+        lost[v] = s * UP
+
+
+SET_VARIABLE = -1
+DROPPED = -2
+"""Owners of a monomial of the Jacobian's table: kept, or of a degree that G and Psi do not carry;
+any other owner v means that the monomial holds the error variable of state v."""
+
+
+@njit(**KERNEL)
+def split_output(Q, o, KJ, q, embed, owner, start, J, dJ, nJ, swing):
+    """Split an output of the Jacobian tape: its polynomial J (KJ+1, Nq) in the set variables with
+    degrees dJ and norms nJ, and how far it swings with each error variable, swing (n,).
+
+    Returns the norm of what was dropped.
+    """
+    swing[:] = 0.0
+    dropped = 0.0
+    for i in range(KJ + 1):
+        for k in range(owner.size):
+            if owner[k] >= 0:
+                swing[owner[k]] += abs(Q[o, i, k])
+            elif owner[k] == DROPPED:
+                dropped += abs(Q[o, i, k])
+        dJ[i] = -1
+        for d in range(q + 1):
+            s = 0.0
+            for k in range(start[d], start[d + 1]):
+                J[i, k] = Q[o, i, embed[k]]
+                if J[i, k] != 0.0:
+                    dJ[i] = d
+                s += abs(J[i, k])
+            nJ[i, d] = s * UP
+    for v in range(swing.size):
+        swing[v] *= UP
+    return dropped * UP
+
+
+@njit(**KERNEL)
+def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
+    """Mean over the step of each column of df/dw, its sup, and the radius of what the mean misses.
+
+    Output node ``outputs[first + i * nw + j]`` is df_i/dw_j. Returns B (nw, n, Nq), size (n,) =
+    sup |B| wr, miss (n,) = sup |df/dw - B| wr.
+    """
+    nw = radius.size
+    Nq = embed.size
+    B = np.zeros((nw, n, Nq))
+    size = np.zeros(n)
+    miss = np.zeros(n)
+    for i in range(n):
+        for j in range(nw):
+            o = outputs[first + i * nw + j]
+            a = 0.0
+            off = RQ[o]
+            for l in range(KJ + 1):
+                for k in range(owner.size):
+                    if owner[k] != SET_VARIABLE:
+                        off += abs(Q[o, l, k])
+                for k in range(Nq):
+                    x = Q[o, l, embed[k]]
+                    # sup over s in [0, 1] of |s^l - 1/(l + 1)| is l/(l + 1).
+                    off += abs(x) * l / (l + 1)
+                    a += abs(x) / (l + 1)
+                    B[j, i, k] += x / (l + 1)
+            off += 1.01 * (KJ + 3) * UNIT * a
+            size[i] += a * UP * radius[j]
+            miss[i] += off * UP * radius[j]
+    for i in range(n):
+        size[i] = size[i] * UP + TINY
+        miss[i] = miss[i] * UP + TINY
+    return B, size, miss
+
+
+@njit(**KERNEL)
+def flow_step(
+    ops, const, const_rad, outputs, variables,
+    jops, jconst, jconst_rad, joutputs, jvariables,
+    states, p, G, radius, full_w, first_w, time_index, h, K, cut, KJ, q, KP, pairs, most, ebox0,
+    P, dg, norms, R, kinks, ranges, Q, dq, nQ, RQ, jkinks, jranges,
+    product, offset, start, degree,
+    jproduct, joffset, jstart, jdegree, jpairs, jcut, embed, owner, errors,
+):  # fmt: skip
+    """One step. Variables of both tapes: states, then time, disturbance, unknowns, all in p.
+
+    The tape of f works over the table of the set variables. The tape of the Jacobian works over a
+    second table with one more variable for the error of each state (``errors``: their monomials);
+    embed[k] is monomial k of the first table in the second.
+
+    ``radius`` (nw,) half-widths of the disturbance around the centre held in p; ``full_w``: df/dx and
+    df/dw depend on w, evaluate them for all w; ``first_w``: index of variable w[0]. G (ng, n, Nq), at
+    most ``most`` of them.
+
+    Returns (status, node, p_end (n, N), G_end, tube (n,), bend (n,), defect, control (4,)) where
+    tube bounds e over the whole step, bend the distance of p(s) from the chord p(0)..p(1), and
+    control = (time defect, other defect, spectral radius of h M, of h A0) for the step control.
+    """
+    n = states
+    Nq = G.shape[2]
+    N = P.shape[2]
+    nw = radius.size
+    nothing_p = np.zeros((n, N))
+    nothing = np.zeros(n)
+    control = np.zeros(4)
+    control[0] = np.inf
+    defect, in_time, bad = taylor_step(
+        ops, const, const_rad, outputs, variables, n, p, time_index, h, K, cut, pairs,
+        P, dg, norms, R, kinks, ranges, product, offset, start, degree,
+    )  # fmt: skip
+    for i in range(n):
+        if not defect[i] < np.inf:
+            return UNDEFINED, max(bad, 0), nothing_p, G, nothing, nothing, defect, control
+    z = np.zeros(n)
+    for g in range(G.shape[0]):
+        for i in range(n):
+            for k in range(Nq):
+                z[i] += abs(G[g, i, k])
+    z = z * UP
+    lost = np.zeros(variables.size)
+    J = np.zeros((n * n, KJ + 1, Nq))
+    dJ = np.zeros((n * n, KJ + 1), np.int64)
+    nJ = np.zeros((n * n, KJ + 1, q + 1))
+    A0 = np.zeros((n, n))
+    RJ = np.zeros(n * n)
+    fixed = np.zeros(n * n)
+    swing = np.zeros((n * n, n))
+    ebox = np.maximum(1.2 * ebox0, 1.2 * (z + 2.0 * defect)) + TINY
+    need = ebox
+    g = nothing
+    u = nothing
+    X = A0
+    W = A0
+    Y = np.zeros((n, n))
+    size_y = 0.0
+    F = np.zeros((n, n, Nq))
+    B = np.zeros((nw, n, Nq))
+    size_b = nothing
+    accepted = False
+    for attempt in range(8):
+        truncate_inputs(P, dg, norms, variables, Q, dq, jvariables, KJ, q, embed, start, lost)
+        for v in range(variables.size):
+            RQ[jvariables[v]] = lost[v]
+        for i in range(n):
+            Q[jvariables[i], 0, errors[i]] = ebox[i]
+            dq[jvariables[i], 0] = max(dq[jvariables[i], 0], jdegree[errors[i]])
+        if full_w:
+            for j in range(nw):
+                RQ[jvariables[first_w + j]] = radius[j]
+        jranges[:] = np.nan
+        solve_in_time(
+            jops, jconst, jkinks, jranges, joutputs, jvariables, 0, Q, dq, h, KJ, jcut, jproduct, joffset,
+            jstart, jdegree,
+        )  # fmt: skip
+        coefficient_norms(Q, dq, nQ, jstart)
+        bad = remainders(
+            jops, jconst, jconst_rad, jkinks, jranges, Q, dq, nQ, RQ, KJ, jcut, jpairs, jproduct, joffset,
+            jstart, jdegree,
+        )  # fmt: skip
+        for o in joutputs:
+            if not RQ[o] < np.inf:
+                return JACOBIAN_UNDEFINED, bad, nothing_p, G, ebox, nothing, defect, control
+        for r in range(n * n):
+            o = joutputs[r]
+            fixed[r] = RQ[o] + split_output(Q, o, KJ, q, embed, owner, start, J[r], dJ[r], nJ[r], swing[r])
+            A0[r // n, r % n] = J[r, 0, 0]
+        X = h * A0
+        W, _ = exponential_majorant(X)
+        control[3] = spectral_radius(X)
+        F, sup, last, curve, tails = fundamental_matrix(J, dJ, n, h, KJ, KP, q, product, offset, start, degree)
+        B, size_b, miss_b = disturbance_bounds(Q, RQ, joutputs, n * n, n, radius, KJ, embed, owner)
+        u = np.zeros(n)
+        if nw > 0:
+            for r in range(n):
+                for c in range(n):
+                    s = 0.0
+                    for d in range(q + 1):
+                        s += nJ[r * n + c, 0, d]
+                    Y[r, c] = s * h * UP
+            W_set, size_y = exponential_majorant(Y)
+            for r in range(n):
+                for c in range(n):
+                    u[r] += W_set[r, c] * h * size_b[c]
+            u = u * UP
+        shrink = np.ones(n)
+        # Twice: once e is proved to stay within ``need``, the Jacobian swings only with that.
+        for final in range(2):
+            # f(p + e) - f(p) = int_0^1 J(p + l e) dl e: powers of l e count by half at most.
+            for r in range(n * n):
+                s = 0.0
+                for v in range(n):
+                    s += swing[r, v] * shrink[v]
+                RJ[r] = (fixed[r] + 0.5 * s) * UP
+            E = fundamental_defect(nJ, RJ, sup, tails, n, h, KJ, KP, q, pairs)
+            D = np.zeros((n, n))
+            M = np.zeros((n, n))
+            for r in range(n):
+                for c in range(n):
+                    s = RJ[r * n + c]
+                    for i in range(KJ + 1):
+                        for d in range(q + 1):
+                            if i > 0 or d > 0:
+                                s += nJ[r * n + c, i, d]
+                    D[r, c] = s * UP + 4.0 * UNIT * abs(A0[r, c])
+                    if r == c:
+                        M[r, c] = max(0.0, A0[r, c] + D[r, c]) * UP
+                    else:
+                        M[r, c] = (abs(A0[r, c]) + D[r, c]) * UP
+            c_total = np.zeros(n)
+            for r in range(n):
+                s = defect[r] + h * miss_b[r]
+                for k in range(n):
+                    # u follows J at s = 0; what moves later, or with e, acts on it from outside.
+                    moved = RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k])
+                    for i in range(1, KJ + 1):
+                        for d in range(q + 1):
+                            moved += nJ[r * n + k, i, d]
+                    s += E[r, k] * z[k] + h * moved * u[k]
+                c_total[r] = s * UP
+            Wc = np.zeros(n)
+            for r in range(n):
+                for k in range(n):
+                    Wc[r] += W[r, k] * c_total[k]
+            Wc = Wc * UP
+            WD = matrix_product(W, D) * UP
+            control[2] = spectral_radius(h * WD)
+            ok_plain, g_plain = growth_bound(h, M, c_total)
+            ok_exp, g_exp = growth_bound(h, WD, Wc)
+            if ok_plain and ok_exp:
+                g = np.minimum(g_plain, g_exp)
+            elif ok_plain:
+                g = g_plain
+            elif ok_exp:
+                g = g_exp
+            else:
+                return NO_GROWTH_BOUND, 0, nothing_p, G, ebox, nothing, defect, control
+            need = np.zeros(n)
+            inside = True
+            for r in range(n):
+                # Psi(s) e(0) is within ``curve`` of the chord between its ends.
+                s = g[r] + u[r]
+                end = 0.0
+                for k in range(n):
+                    s += curve[r, k] * z[k]
+                    end += last[r, k] * z[k]
+                need[r] = (max(z[r], end * UP) + s) * UP
+                if not need[r] < ebox[r]:
+                    inside = False
+            if final == 0:
+                accepted = inside
+                if not accepted:
+                    break
+                for v in range(n):
+                    shrink[v] = min(1.0, need[v] / ebox[v] * UP)
+        if accepted:
+            break
+        ebox = np.maximum(ebox, 1.3 * need)
+    if not accepted:
+        return NO_CONTRACTION, 0, nothing_p, G, ebox, nothing, defect, control
+    # p(1): K + 1 terms summed, at most K roundings.
+    p_end = np.zeros((n, N))
+    bend = np.zeros(n)
+    box = g.copy()
+    for i in range(n):
+        v = variables[i]
+        e = 0.0
+        for k in range(N):
+            s = 0.0
+            for j in range(K, -1, -1):
+                s += P[v, j, k]
+                e += abs(P[v, j, k])
+            p_end[i, k] = s
+        rounding = 1.01 * (K + 1) * UNIT * e * UP
+        box[i] += rounding
+        s = rounding
+        for j in range(2, K + 1):
+            for d in range(norms.shape[2]):
+                s += chord_distance(j) * norms[v, j, d]
+        bend[i] = s * UP
+    first = np.zeros((nw, n, Nq))
+    second = np.zeros((nw, n, Nq))
+    if nw > 0:
+        # u' = h J(0, xi) u + h B(xi) v, so u(1) = int exp(Y (1 - s)) h B v ds with Y = h J(0, xi):
+        # two columns an input, and a box for the rest.
+        Y2 = matrix_product(Y, Y) * UP
+        largest = 0.0
+        for i in range(n):
+            largest = max(largest, h * size_b[i])
+        # Third and higher powers entry by entry, int (1 - s)^k / k! ds = 1 / (k + 1)!; the tail beyond
+        # in the infinity norm, hence in every entry.
+        high = np.zeros(n)
+        power = Y2
+        factorial = 6.0
+        tail = size_y * size_y
+        for k in range(3, 11):
+            power = matrix_product(power, Y) * UP
+            factorial *= k + 1
+            tail *= size_y
+            for i in range(n):
+                for l in range(n):
+                    high[i] += power[i, l] * h * size_b[l] / factorial
+        rest = tail * size_y / (12.0 * factorial) * np.exp(size_y) * largest
+        gamma = 1.01 * (2 * n * pairs + 3 * n + 16) * UNIT
+        for i in range(n):
+            s = rest + high[i]
+            for k in range(n):
+                identity = 1.0 if i == k else 0.0
+                s += (SIGMA_2 * Y2[i, k] + gamma * (identity + Y[i, k] + Y2[i, k])) * h * size_b[k]
+            box[i] += s * UP + TINY
+        for j in range(nw):
+            image, lost_1 = apply_matrix(J, dJ, B[j], n, q, h, product, offset, start, degree)
+            again, lost_2 = apply_matrix(J, dJ, image, n, q, h, product, offset, start, degree)
+            for i in range(n):
+                s = 0.75 * lost_1[i] + lost_2[i] / 6.0
+                for k in range(n):
+                    s += Y[i, k] * lost_1[k] / 6.0
+                box[i] += h * radius[j] * s * UP
+                for l in range(Nq):
+                    first[j, i, l] = h * radius[j] * (B[j, i, l] + image[i, l] / 2.0 + again[i, l] / 6.0)
+                    second[j, i, l] = h * radius[j] * image[i, l] / 4.0
+    H, dropped = advance_generators(F, G, q, pairs, product, offset, start, degree)
+    old = H.shape[0]
+    grown = np.zeros((old + n + 2 * nw, n, Nq))
+    grown[:old] = H
+    for i in range(n):
+        grown[old + i, i, 0] = (box[i] + dropped[i]) * UP + TINY
+    for j in range(nw):
+        grown[old + n + 2 * j] = first[j]
+        grown[old + n + 2 * j + 1] = second[j]
+    if grown.shape[0] > most:
+        grown = reduce_generators(grown, most - 2 * n - 2 * nw)
+    time_error = 0.0
+    other = 0.0
+    for i in range(n):
+        time_error = max(time_error, in_time[i])
+        other = max(other, defect[i] - in_time[i])
+    control[0] = time_error
+    control[1] = other
+    return DONE, 0, p_end, grown, need, bend, defect, control

@@ -1,0 +1,134 @@
+"""One verdict for a class of references out of the verdicts of its members."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from modegraph.certify.references import Parameter, parameter_text
+from modegraph.certify.verdict import Status, Verdict, Witness
+
+Case = tuple[Parameter, Parameter, Verdict]
+
+
+def some_pair(cases: Sequence[Case]) -> Verdict:
+    """The existential verdict over pairs (r_i, r_j): certified if one is, refuted if all are.
+
+    The figures of a certified answer hold for every certified pair: hull of the times, smallest
+    margin, slack and window, largest energy. Otherwise ``margin`` is that of the closest pair.
+    """
+    cases = [(r_i, r_j, _with_references(v, r_i, r_j)) for r_i, r_j, v in cases]
+    if len(cases) == 1:
+        return cases[0][2]
+    by_status = {s: [c for c in cases if c[2].status is s] for s in Status}
+    certified, undecided = by_status[Status.CERTIFIED], by_status[Status.UNDECIDED]
+    count = len(cases)
+    if certified:
+        verdicts = [v for _, _, v in certified]
+        times = [v.time for v in verdicts if v.time is not None]
+        return Verdict(
+            status=Status.CERTIFIED,
+            reason=f"certified for {len(certified)} of {count} pairs of references, {_told(certified[0])}",
+            time=(min(t[0] for t in times), max(t[1] for t in times)) if times else None,
+            margin=_smallest(v.margin for v in verdicts),
+            slack=_least_slack(verdicts),
+            horizon=_smallest(v.horizon for v in verdicts if v.horizon is not None),
+            energy=_largest(v.energy for v in verdicts),
+            window=_smallest(v.window for v in verdicts),
+        )
+    rest = undecided or cases
+    closest = max(rest, key=lambda c: -np.inf if c[2].margin is None else c[2].margin)
+    horizons = [v.horizon for _, _, v in rest if v.horizon is not None]
+    if undecided:
+        share = "all" if len(undecided) == count else f"{len(undecided)} of"
+        others = "" if len(undecided) == count else ", refuted for the others"
+        reason = f"undecided for {share} {count} pairs of references{others}; closest {_told(closest)}"
+        status = Status.UNDECIDED
+    else:
+        reason = f"refuted for all {count} pairs of references; closest {_told(closest)}"
+        status = Status.REFUTED
+    return Verdict(
+        status=status,
+        reason=reason,
+        margin=closest[2].margin,
+        witness=closest[2].witness,
+        horizon=min(horizons) if horizons else None,
+        until=closest[2].until,
+    )
+
+
+def every_member(cases: Sequence[tuple[Parameter, Verdict]]) -> Verdict:
+    """The universal verdict of a check over a class: certified if all are, refuted if one is."""
+    if len(cases) == 1:
+        return cases[0][1]
+    count = len(cases)
+    failing = [c for c in cases if c[1].status is Status.REFUTED]
+    open_ = [c for c in cases if c[1].status is Status.UNDECIDED]
+    verdicts = [v for _, v in cases]
+    if failing:
+        p, worst = failing[0]
+        reason = f"refuted for {len(failing)} of {count} references, e.g. {parameter_text(p)}: {worst.reason}"
+        return replace(worst, reason=reason, witness=_named(worst.witness, p, None))
+    if open_:
+        p, worst = open_[0]
+        reason = f"undecided for {len(open_)} of {count} references, e.g. {parameter_text(p)}: {worst.reason}"
+        return replace(
+            worst,
+            reason=reason,
+            until=_smallest(v.until for _, v in open_),
+            slack=_least_slack(verdicts),
+            tracking=_widest(verdicts),
+        )
+    return Verdict(
+        status=Status.CERTIFIED,
+        reason=f"certified for all {count} references",
+        margin=_smallest(v.margin for v in verdicts),
+        slack=_least_slack(verdicts),
+        tracking=_widest(verdicts),
+    )
+
+
+def _told(case: Case) -> str:
+    r_i, r_j, verdict = case
+    return f"from reference {parameter_text(r_i)} to {parameter_text(r_j)}: {verdict.reason}"
+
+
+def _with_references(verdict: Verdict, r_i: Parameter, r_j: Parameter) -> Verdict:
+    if verdict.witness is None:
+        return verdict
+    return replace(verdict, witness=_named(verdict.witness, r_i, r_j))
+
+
+def _named(witness: Witness | None, r_i: Parameter, r_j: Parameter) -> Witness | None:
+    if witness is None:
+        return None
+    return replace(
+        witness,
+        r_i=r_i if witness.r_i is None else witness.r_i,
+        r_j=r_j if witness.r_j is None else witness.r_j,
+    )
+
+
+def _smallest(values: Iterable[float | None]) -> float | None:
+    found = list(values)
+    known = [v for v in found if v is not None]
+    return min(known) if known and len(known) == len(found) else None
+
+
+def _largest(values: Iterable[float | None]) -> float | None:
+    found = list(values)
+    known = [v for v in found if v is not None]
+    return max(known) if known and len(known) == len(found) else None
+
+
+def _least_slack(verdicts: Sequence[Verdict]) -> dict[str, float]:
+    """Only constraints that every verdict has a bound for: a missing one is not known to hold."""
+    names = [n for n in verdicts[0].slack if all(n in v.slack for v in verdicts)]
+    return {n: min(v.slack[n] for v in verdicts) for n in names}
+
+
+def _widest(verdicts: Sequence[Verdict]) -> np.ndarray | None:
+    bounds = [v.tracking for v in verdicts if v.tracking is not None]
+    return np.max(bounds, axis=0) if bounds and len(bounds) == len(verdicts) else None

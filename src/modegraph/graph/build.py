@@ -1,0 +1,214 @@
+"""``build``: every ordered pair of modes and every check, one unit of work per mode and reference."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from numbers import Real
+from threading import Lock
+from typing import Any
+
+from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
+from modegraph.certify.verdict import Status, Verdict
+from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.graph.modegraph import ModeGraph, Node
+from modegraph.graph.progress import Progress, reporting
+from modegraph.model.closed_loop import close_loop
+from modegraph.model.mode import Mode
+from modegraph.model.target import Target
+from modegraph.model.validation import validate_modes
+
+DEFAULT_BUDGET = 600.0
+"""Seconds of work when ``budget`` is not given."""
+
+
+class _Stopped(Exception):
+    """Raised inside a unit when the build was interrupted."""
+
+
+def build(
+    modes: Sequence[Mode | Target],
+    *,
+    horizon: float | None = None,
+    period: float | None = None,
+    noise: Any = None,
+    store: Any = None,
+    executor: Any = None,
+    progress: Any = None,
+    budget: float | None = None,
+) -> ModeGraph:
+    """Prove which modes can be chained.
+
+    Parameters
+    ----------
+    modes : sequence of Mode or Target
+        Same states, different names.
+    horizon : float, optional
+        Seconds a switch may take; ``Mode.horizon`` overrides it. None: until a tail is certified
+        or the budget ends.
+    period, noise, store, executor
+        Not built yet: anything but None is an error.
+    progress : None, True or callable(done, total, text)
+        True shows a bar in a terminal.
+    budget : float, optional
+        Seconds of work; what is not decided then is UNDECIDED. By default 600.
+
+    Returns
+    -------
+    ModeGraph
+        Also when pairs are refuted or undecided. An interrupt (Ctrl-C) ends the work and gives
+        the graph of what was decided until then.
+
+    Raises
+    ------
+    ModegraphError
+        If the model is wrong. The message names mode, function and remedy.
+    """
+    for name, value in (("period", period), ("noise", noise), ("store", store), ("executor", executor)):
+        if value is not None:
+            raise NotBuiltYet(f"build: {name}= is not built yet; leave it out")
+    _positive("horizon", horizon)
+    _positive("budget", budget)
+    modes = validate_modes(modes)
+    units = _units(modes, horizon)
+    with reporting(progress) as report:
+        results = _Work(units, report, DEFAULT_BUDGET if budget is None else float(budget)).run()
+    verdicts: dict[tuple[Node, Node], Verdict] = {}
+    checks: dict[Node, Verdict] = {}
+    for unit, result in zip(units, results, strict=True):
+        checks[unit.node] = result.check
+        for node, verdict in zip(unit.target_nodes, result.verdicts, strict=True):
+            verdicts[unit.node, node] = verdict
+    return ModeGraph(modes, verdicts, checks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Unit:
+    """One mode under one reference, with everything its flowpipe is tested against."""
+
+    mode: Mode
+    node: Node
+    parameter: Any
+    horizon: float | None
+    target_nodes: tuple[Node, ...]
+    targets: tuple[TargetSpec, ...]
+
+    def undecided(self, reason: str) -> UnitResult:
+        nothing = Verdict(Status.UNDECIDED, reason, horizon=self.horizon)
+        return UnitResult(verdicts=[nothing] * len(self.targets), check=nothing)
+
+
+def _positive(name: str, value: float | None) -> None:
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < math.inf:
+        raise ModegraphError(f"build: {name} must be a positive number of seconds or None, not {value!r}")
+
+
+def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]:
+    """All units; every closed loop is traced once so that a wrong model fails before any proof."""
+    nodes: list[tuple[Node, Any, Mode | Target]] = []
+    for mode in modes:
+        if isinstance(mode, Target):
+            nodes.append(((mode.name, 0), None, mode))
+            continue
+        for a, p in enumerate(mode.reference.parameters()):
+            close_loop(mode, p)
+            nodes.append(((mode.name, a), p, mode))
+    specs = {node: TargetSpec(name=mode.name, p=p, mode=mode) for node, p, mode in nodes}
+    units = []
+    for node, p, mode in nodes:
+        if isinstance(mode, Target):
+            continue
+        others = tuple(other for other in specs if other != node)
+        own = horizon if mode.horizon is None else mode.horizon
+        units.append(_Unit(mode, node, p, own, others, tuple(specs[n] for n in others)))
+    return units
+
+
+@dataclass(eq=False)
+class _Work:
+    """Units in a thread pool (the kernels release the interpreter lock), within a budget."""
+
+    units: Sequence[_Unit]
+    report: Progress
+    budget: float
+    stopped: bool = False
+    done: int = 0
+    lock: Any = field(default_factory=Lock)
+
+    def run(self) -> list[UnitResult]:
+        threads = max(1, min(os.cpu_count() or 1, len(self.units)))
+        self.end = time.monotonic() + self.budget
+        self.waiting = len(self.units)
+        self.threads = threads
+        self.report(0, len(self.units), "")
+        with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="modegraph") as pool:
+            futures = {pool.submit(self._unit, unit): unit for unit in self.units}
+            try:
+                self._watch(futures)
+            except KeyboardInterrupt:
+                self._stop(futures)
+            except BaseException:
+                self._stop(futures)
+                raise
+        return [self._result(future, unit) for future, unit in futures.items()]
+
+    def _watch(self, futures: dict[Future[UnitResult], _Unit]) -> None:
+        """Wait for all units; the error of a wrong model ends it at once."""
+        open_ = set(futures)
+        while open_:
+            finished, open_ = wait(open_, return_when=FIRST_COMPLETED)
+            for future in finished:
+                future.result()
+                self.done += 1
+                self.report(self.done, len(futures), futures[future].mode.name)
+
+    def _stop(self, futures: dict[Future[UnitResult], _Unit]) -> None:
+        self.stopped = True
+        for future in futures:
+            future.cancel()
+
+    def _unit(self, unit: _Unit) -> UnitResult:
+        with self.lock:
+            # An equal share of the time that is left: a hard unit cannot starve the others.
+            rounds = math.ceil(self.waiting / self.threads)
+            self.waiting -= 1
+        now = time.monotonic()
+        if now >= self.end:
+            return unit.undecided(f"the budget of {self.budget:g} s ended before this mode was examined")
+        deadline = now + (self.end - now) / rounds
+
+        def progress(text: str = "") -> None:
+            if self.stopped:
+                raise _Stopped
+            if text:
+                self.report(self.done, len(self.units), f"{unit.mode.name}: {text}")
+
+        try:
+            return certify_unit(
+                unit.mode,
+                unit.parameter,
+                list(unit.targets),
+                horizon=unit.horizon,
+                deadline=deadline,
+                progress=progress,
+            )
+        except (ModegraphError, _Stopped):
+            raise
+        except Exception as error:
+            return unit.undecided(f"the proof engine stopped with {type(error).__name__}: {error}")
+
+    @staticmethod
+    def _result(future: Future[UnitResult], unit: _Unit) -> UnitResult:
+        if not future.cancelled():
+            error = future.exception()
+            if error is None:
+                return future.result()
+            if not isinstance(error, _Stopped):
+                raise error
+        return unit.undecided("interrupted before this mode was examined")

@@ -1,0 +1,400 @@
+"""The graph of certified switches and the questions it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from modegraph.certify.references import Cell, Parameter, References, parameter_text
+from modegraph.certify.verdict import Status, Verdict
+from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.graph.aggregate import Case, every_member, some_pair
+from modegraph.graph.entry import may_enter, plain_state
+from modegraph.graph.submodes import Edge, Submode, algorithm_1
+from modegraph.graph.switch import Switch
+from modegraph.model.mode import Mode
+from modegraph.model.target import Target
+
+if TYPE_CHECKING:
+    from modegraph.plan.plan import Plan
+
+Node = tuple[str, int]
+"""A mode and the position of one reference in its class (0 for a Target)."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why there is, or is not, a switch; ``str()`` is the text."""
+
+    source: str
+    target: str
+    verdict: Verdict
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+class ModeGraph:
+    """Which modes can be chained, with proofs. Made by ``modegraph.build``.
+
+    Attributes
+    ----------
+    modes : mapping of str to Mode or Target
+        In the order given to ``build``.
+    switches : tuple[Switch, ...]
+        Certified switches only, in mode order.
+    submodes : tuple[Submode, ...]
+        The nodes of Algorithm 1.
+    edges : tuple[Edge, ...]
+        Its edges, of both kinds.
+    """
+
+    def __init__(
+        self,
+        modes: Sequence[Mode | Target],
+        verdicts: Mapping[tuple[Node, Node], Verdict],
+        checks: Mapping[Node, Verdict],
+    ) -> None:
+        """Collect the verdicts of all ordered pairs of nodes and the check of every node."""
+        self._modes = {m.name: m for m in modes}
+        self._verdicts = dict(verdicts)
+        self._checks = dict(checks)
+        self._parameters: dict[str, tuple[Parameter, ...]] = {
+            m.name: (None,) if isinstance(m, Target) else tuple(m.reference.parameters()) for m in modes
+        }
+
+    @property
+    def modes(self) -> Mapping[str, Mode | Target]:
+        return MappingProxyType(self._modes)
+
+    @cached_property
+    def switches(self) -> tuple[Switch, ...]:
+        found = (self._switch(i, j) for i in self._modes for j in self._modes)
+        return tuple(s for s in found if s is not None)
+
+    @property
+    def submodes(self) -> tuple[Submode, ...]:
+        return self._algorithm_1[0]
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        return self._algorithm_1[1]
+
+    def verdict(self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None) -> Verdict:
+        """Whether mode ``i`` can be followed by ``j``: the answer to condition (C).
+
+        Without references the answer is existential over the classes: certified if some pair is,
+        refuted if every pair is. With one reference given, existential over the other. The pair of
+        a reference with itself (i = j) is trivial and left out.
+
+        Raises
+        ------
+        ModegraphError
+            For an unknown mode or reference, a Target as source, or when no pair is left.
+        """
+        return some_pair(self._cases(self.name_of(i), self.name_of(j), r_i, r_j))
+
+    def check(self, i: str | Mode, r: Any = None) -> Verdict:
+        """Whether the constraints of mode ``i`` hold for all time, for its whole class of references.
+
+        Parameters
+        ----------
+        i : str or Mode
+        r : reference, optional
+            Only for this member of the class.
+
+        Raises
+        ------
+        ModegraphError
+            For an unknown mode or reference, or a Target, in which no controller runs.
+        """
+        name = self._running(self.name_of(i), "there is nothing to check in it")
+        return every_member(
+            [(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)]
+        )
+
+    def explain(self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None) -> Explanation:
+        """The verdict on i -> j told in words: reason, figures, counterexample."""
+        source, target = self.name_of(i), self.name_of(j)
+        verdict = self.verdict(source, target, r_i, r_j)
+        return Explanation(source, target, verdict, _explained(source, target, verdict))
+
+    def plan(
+        self,
+        start: str | Mode | None = None,
+        goal: str | Mode | Target | None = None,
+        *,
+        minimize: str | Mapping[str, float] = "switches",
+        r_start: Any = None,
+        r_goal: Any = None,
+        x0: Any = None,
+        via: Sequence[str | Mode] = (),
+        avoid: Sequence[str | Mode | Target] = (),
+        max_switches: int | None = None,
+    ) -> Plan:
+        """The best chain of certified switches from ``start`` (or from the state ``x0``) to ``goal``.
+
+        Ties are broken by fewer switches, then smaller latest time, then mode order.
+
+        Parameters
+        ----------
+        start : str or Mode, optional
+            The mode that runs at first. Without it, any mode that ``x0`` allows to enter.
+        goal : str, Mode or Target
+            Where to end. If it is also the start, one mode at no cost, unless ``r_start`` and
+            ``r_goal`` differ.
+        minimize : {"switches", "time", "energy", "margin"} or mapping
+            Worst-case time, worst-case energy, largest bottleneck margin; or non-negative weights
+            by "switches", "time", "energy".
+        r_start, r_goal : reference, optional
+            Fix the reference of the first and the last mode.
+        x0 : (n,) array, optional
+            The state at the beginning; it must lie in the first mode's start set.
+        via : sequence of modes
+            To be visited in this order; a mode left in zero time does not count.
+        avoid : sequence of modes
+            Never entered. (A start mode is not entered: it runs already.)
+        max_switches : int, optional
+
+        Raises
+        ------
+        Unreachable
+            If no chain of certified switches does it.
+        ModegraphError
+            If the question makes no sense.
+        """
+        return self.plans(
+            1,
+            start,
+            goal,
+            minimize=minimize,
+            r_start=r_start,
+            r_goal=r_goal,
+            x0=x0,
+            via=via,
+            avoid=avoid,
+            max_switches=max_switches,
+        )[0]
+
+    def plans(
+        self, k: int, start: str | Mode | None = None, goal: str | Mode | Target | None = None, **options: Any
+    ) -> list[Plan]:
+        """The ``k`` best plans, best first; fewer if there are no more. Options as for ``plan``.
+
+        Two plans differ in their modes or references. None visits the same mode with the same
+        reference twice, except where ``via`` makes it.
+        """
+        from modegraph.plan.planner import plans
+
+        return plans(self, k, start, goal, **options)
+
+    def modes_at(self, x: Any) -> list[tuple[str, References]]:
+        """The modes and targets that may be entered from the state ``x`` (n,) now.
+
+        The References of each hold pairs ``(None, r_j)``: ``.target`` lists the references.
+        """
+        state = plain_state(x, self.dimension)
+        found = []
+        for name, mode in self._modes.items():
+            parameters = self._parameters[name]
+            inside = [b for b, p in enumerate(parameters) if may_enter(mode, p, state)]
+            if inside:
+                found.append((name, References([None], parameters, [(0, b) for b in inside])))
+        return found
+
+    def to_networkx(self) -> Any:
+        """Algorithm 1's graph as a ``networkx.DiGraph``.
+
+        Nodes are Submodes with attributes ``mode, role, source, target``; edges have ``kind``
+        ("switch" or "stay") and ``switches, earliest, latest, energy, margin`` (zero for "stay").
+        """
+        try:
+            import networkx
+        except ImportError as error:
+            raise ModegraphError("to_networkx needs networkx: pip install networkx") from error
+        graph = networkx.DiGraph()
+        for s in self.submodes:
+            graph.add_node(s, mode=s.mode, role=s.role, source=s.source, target=s.target)
+        for edge in self.edges:
+            v = edge.verdict
+            earliest, latest = (0.0, 0.0) if v is None or v.time is None else v.time
+            graph.add_edge(
+                edge.source,
+                edge.target,
+                kind=edge.kind,
+                switches=0 if v is None else 1,
+                earliest=earliest,
+                latest=latest,
+                energy=0.0 if v is None else v.energy,
+                margin=None if v is None else v.margin,
+            )
+        return graph
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw modes and certified switches; returns the matplotlib axes."""
+        from modegraph.report.plots import plot_graph
+
+        return plot_graph(self, ax)
+
+    def add(self, mode: Mode | Target) -> NoReturn:
+        raise NotBuiltYet("adding a mode to a graph is not built yet: call build again with all modes")
+
+    def replace(self, mode: Mode | Target) -> NoReturn:
+        raise NotBuiltYet("replacing a mode of a graph is not built yet: call build again with all modes")
+
+    def remove(self, name: str) -> NoReturn:
+        raise NotBuiltYet("removing a mode from a graph is not built yet: call build again without it")
+
+    def save(self, path: Any) -> NoReturn:
+        raise NotBuiltYet("saving a graph is not built yet")
+
+    @classmethod
+    def load(cls, path: Any) -> NoReturn:
+        raise NotBuiltYet("loading a graph is not built yet")
+
+    def __repr__(self) -> str:
+        return f"ModeGraph({len(self._modes)} modes, {len(self.switches)} certified switches)"
+
+    @property
+    def dimension(self) -> int:
+        """Number of plant states, the same for all modes."""
+        for mode in self._modes.values():
+            return mode.set.dim if isinstance(mode, Target) else mode.system.n
+        raise ModegraphError("the graph has no modes")
+
+    def name_of(self, mode: Any) -> str:
+        """The name of a mode given by name or as the object, checked against this graph."""
+        name = mode if isinstance(mode, str) else getattr(mode, "name", None)
+        if not isinstance(name, str):
+            raise ModegraphError(f"a mode is named by a str or a Mode, not by {type(mode).__name__}")
+        if name not in self._modes:
+            near = get_close_matches(name, self._modes, n=1, cutoff=0.4)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(self._modes)}"
+            raise ModegraphError(f"there is no mode {name!r} in the graph; {hint}")
+        return name
+
+    def indices(self, name: str, r: Any = None) -> list[int]:
+        """Positions in the class of mode ``name`` that ``r`` names; all of them for None."""
+        mode = self._modes[name]
+        if r is None:
+            return list(range(len(self._parameters[name])))
+        if isinstance(mode, Target):
+            raise ModegraphError(f"target {name!r} has no references, but {r!r} was given")
+        return [mode.match(r)]
+
+    def parameter(self, node: Node) -> Parameter:
+        """The reference of a node."""
+        return self._parameters[node[0]][node[1]]
+
+    def nodes(self) -> list[Node]:
+        """All nodes in mode order, then class order."""
+        return [(name, a) for name, p in self._parameters.items() for a in range(len(p))]
+
+    def pair_verdicts(self) -> Mapping[tuple[Node, Node], Verdict]:
+        """The verdict of every ordered pair of different nodes."""
+        return MappingProxyType(self._verdicts)
+
+    def node_check(self, node: Node) -> Verdict:
+        """The check of one mode under one reference."""
+        return self._checks[node]
+
+    def pair_switch(self, source: Node, target: Node) -> Switch:
+        """The certified switch for one pair of references."""
+        v = self._verdicts[source, target]
+        pair = References([self.parameter(source)], [self.parameter(target)], [(0, 0)])
+        return _switch_of(source[0], target[0], pair, v)
+
+    @cached_property
+    def _algorithm_1(self) -> tuple[tuple[Submode, ...], tuple[Edge, ...]]:
+        def verdicts(switch: Switch, cell: Cell) -> list[Case]:
+            nodes = [
+                ((switch.source, a), (switch.target, b)) for a in cell.source_index for b in cell.target_index
+            ]
+            return [(self.parameter(s), self.parameter(t), self._verdicts[s, t]) for s, t in nodes]
+
+        submodes, edges = algorithm_1(self.switches, verdicts)
+        return tuple(submodes), tuple(edges)
+
+    def _switch(self, i: str, j: str) -> Switch | None:
+        if isinstance(self._modes[i], Target):
+            return None
+        pairs: dict[tuple[int, int], Verdict] = {}
+        undecided = 0
+        for a in self.indices(i):
+            for b in self.indices(j):
+                v = self._verdicts.get(((i, a), (j, b)))
+                if v is not None and v.status is Status.CERTIFIED:
+                    pairs[a, b] = v
+                elif v is not None and v.status is Status.UNDECIDED:
+                    undecided += 1
+        if not pairs:
+            return None
+        references = References(self._parameters[i], self._parameters[j], pairs, undecided)
+        cases = [(self._parameters[i][a], self._parameters[j][b], v) for (a, b), v in pairs.items()]
+        return _switch_of(i, j, references, some_pair(cases))
+
+    def _running(self, name: str, consequence: str) -> str:
+        if isinstance(self._modes[name], Target):
+            raise ModegraphError(f"{name!r} is a target: it is entered and never left, {consequence}")
+        return name
+
+    def _cases(self, i: str, j: str, r_i: Any, r_j: Any) -> list[Case]:
+        self._running(i, "no switch starts in it")
+        cases = [
+            (self._parameters[i][a], self._parameters[j][b], self._verdicts[(i, a), (j, b)])
+            for a in self.indices(i, r_i)
+            for b in self.indices(j, r_j)
+            if (i, a) != (j, b)
+        ]
+        if not cases and len(self._parameters[i]) == 1:
+            raise ModegraphError(f"mode {i!r} has a single reference: a switch to itself means nothing")
+        if not cases:
+            raise ModegraphError(f"mode {i!r}: a switch from a reference to itself means nothing")
+        return cases
+
+
+def _switch_of(i: str, j: str, references: References, v: Verdict) -> Switch:
+    if v.time is None:
+        raise ValueError(f"the certified verdict {i} -> {j} has no time")
+    return Switch(i, j, references, v.time, v.energy, v.margin, v.window)
+
+
+def _explained(i: str, j: str, v: Verdict) -> str:
+    lines = [f"{i} -> {j}: {v.status.value}", f"  {v.reason}"]
+    if v.time is not None:
+        lines.append(f"  time: enters between {v.time[0]:.6g} and {v.time[1]:.6g} s")
+    for label, value, unit in (
+        ("margin", v.margin, ""),
+        ("energy", v.energy, ""),
+        ("stays inside", v.window, " s"),
+        ("examined up to", v.horizon, " s"),
+        ("constraints proved up to", v.until, " s"),
+    ):
+        if value is not None:
+            lines.append(f"  {label}: {value:.4g}{unit}")
+    for name, slack in v.slack.items():
+        lines.append(f"  slack of {name}: {slack:.4g}")
+    if v.witness is not None:
+        w = v.witness
+        what = {
+            "violates": f"violates a constraint at {w.time:.6g} s",
+            "trapped": f"never arrives (trapped from {w.time:.6g} s on)",
+            "horizon": f"has not arrived by {w.time:.6g} s",
+        }[w.kind]
+        lines.append(f"  counterexample: the start x0 = {parameter_text(np.asarray(w.x0))} {what}")
+        if w.w is not None:
+            lines.append(f"    with the constant disturbance w = {parameter_text(w.w)}")
+        if w.d:
+            lines.append("    with " + ", ".join(f"{n} = {value:.6g}" for n, value in w.d.items()))
+        if w.r_i is not None:
+            lines.append(f"    with r_i = {parameter_text(w.r_i)}")
+        if w.r_j is not None:
+            lines.append(f"    with r_j = {parameter_text(w.r_j)}")
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""What an engineer states: systems, modes, references, sets, constraints."""

@@ -1,0 +1,305 @@
+"""The closed loop of one mode under one reference, traced to expressions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from modegraph.errors import ModegraphError
+from modegraph.expression.array import TracedArray
+from modegraph.expression.ops import LOG, RECIP, WHERE
+from modegraph.expression.piecewise import resolve
+from modegraph.expression.scalar import Expr, Graph
+from modegraph.expression.trace import as_vector, call, required_arguments
+from modegraph.model.constraints import Face, faces_of
+from modegraph.model.mode import Mode
+from modegraph.model.numeric import require_finite_values
+from modegraph.model.reference import Floats, Piece
+from modegraph.model.start import mode_start
+from modegraph.model.switching_times import jumps, switching_times
+from modegraph.model.trajectory import at_instant
+from modegraph.model.validation import validate_modes
+
+__all__ = ["ClosedLoop", "Face", "Segment", "close_loop", "mode_start", "validate_modes"]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """The closed loop between two instants at which it may be discontinuous in time.
+
+    Attributes
+    ----------
+    start, end : float
+        Seconds after entering the mode; ``end`` is ``inf`` for the last segment.
+    rhs : list[Expr]
+        x' (n,), then z' (k,).
+    inputs : list[Expr]
+        u (p,).
+    constraints : list[Face]
+        Satisfied where expr <= 0, on the closed segment.
+    tracking : list[Expr]
+        output - r (m,); empty without an output.
+    """
+
+    start: float
+    end: float
+    rhs: list[Expr]
+    inputs: list[Expr]
+    constraints: list[Face]
+    tracking: list[Expr]
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """All expressions of a mode under one reference, on one graph.
+
+    Attributes
+    ----------
+    states : list[Expr]
+        Variables: n plant states, then k memory states; ``names`` in the same order.
+    time : Expr
+        Seconds since the mode was entered.
+    disturbance : list[Expr]
+        Variables w (q,).
+    unknowns : dict[str, Expr]
+        One variable for each unknown constant.
+    segments : list[Segment]
+        Contiguous from t = 0 to ``inf``.
+    reset : list[Expr]
+        Memory on entry (k,) as a function of the plant states.
+    """
+
+    graph: Graph
+    names: list[str]
+    states: list[Expr]
+    time: Expr
+    disturbance: list[Expr]
+    unknowns: dict[str, Expr]
+    segments: list[Segment]
+    reset: list[Expr]
+    has_constraints: bool
+
+
+def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
+    """Trace plant, controller, memory, constraints and output under the reference named p.
+
+    Segments end at the breakpoints of the reference, at its duration, and where the controller
+    itself switches in time.
+
+    Raises
+    ------
+    ModegraphError
+        If a function of the mode is wrong. Names mode, function and remedy.
+    """
+    p = mode.reference.parameters()[mode.match(p)]
+    trace = _Trace(mode, p)
+    segments = [segment for piece in trace.pieces for segment in trace.segments(piece)]
+    loop = ClosedLoop(
+        graph=trace.graph,
+        names=list(mode.state_names),
+        states=[*trace.x, *trace.z],
+        time=trace.time,
+        disturbance=trace.w,
+        unknowns=dict(trace.d),
+        segments=segments,
+        reset=trace.reset(),
+        has_constraints=mode.constraints is not None,
+    )
+    require_finite_values(mode, p, mode_start(mode, p))
+    return loop
+
+
+def fixed(values: Any) -> TracedArray:
+    """A traced vector that the function it is handed to cannot change in place."""
+    array = TracedArray(values)
+    array.flags.writeable = False
+    return array
+
+
+class TracedReference(TracedArray):
+    """r while tracing: (m,) with ``.dot`` and ``.ddot``; a slice keeps the derivatives of what is left."""
+
+    dot: Any
+    ddot: Any
+
+    @classmethod
+    def of(cls, value: Any, dot: Any, ddot: Any) -> TracedReference:
+        """From three vectors of traced scalars."""
+        self = fixed(value).view(cls)
+        self.dot = fixed(dot)
+        self.ddot = fixed(ddot)
+        return self
+
+    def __getitem__(self, key: Any) -> Any:
+        part = self.view(TracedArray)[key]
+        if isinstance(part, TracedArray) and "ddot" in self.__dict__:
+            return TracedReference.of(part, self.dot[key], self.ddot[key])
+        return part
+
+
+class _Unknowns(dict[str, Expr]):
+    """``d`` while tracing: d["name"] with a clear error for a name that was not declared."""
+
+    def __missing__(self, name: object) -> Expr:
+        raise ModegraphError(
+            f"d[{name!r}] is not an unknown constant of the plant; it has "
+            f"{', '.join(map(repr, self)) or 'none'}: "
+            "declare it in System(..., unknowns={name: (lo, hi)})"
+        )
+
+
+class _Trace:
+    """Variables and calls of one tracing."""
+
+    def __init__(self, mode: Mode, p: Floats | None) -> None:
+        self.mode = mode
+        self.owner = f"mode {mode.label_of(p)!r}"
+        self.graph = Graph()
+        taken: set[str] = set()
+        self.x = [self._variable(name, taken) for name in mode.system.states]
+        self.z = [self._variable(name, taken) for name in mode.state_names[mode.system.n :]]
+        self.time = self._variable("t", taken)
+        self.w = [self._variable(f"w[{k}]", taken) for k in range(mode.system.q)]
+        self.d = _Unknowns((name, self._variable(f"d[{name!r}]", taken)) for name in mode.system.unknowns)
+        self.pieces = mode.reference.pieces(self.graph, self.time, p, self.owner)
+
+    def _variable(self, name: str, taken: set[str]) -> Expr:
+        """A variable of its own, also where the user's names coincide ("t" may be a temperature)."""
+        while name in taken:
+            name += "'"
+        taken.add(name)
+        return self.graph.variable(name)
+
+    def segments(self, piece: Piece) -> list[Segment]:
+        """Trace one piece of the reference and cut it where the functions themselves switch in time."""
+        mode = self.mode
+        r = TracedReference.of(piece.value, piece.dot, piece.ddot)
+        x = fixed(self.x)
+        seen: dict[str, Any] = {"x": x, "r": r, "t": self.time}
+        if mode.memory is not None:
+            seen["z"] = fixed(self.z)
+        inputs = self._vector(mode.controller, "controller", seen, mode.system.p)
+        u = fixed(inputs)
+        plant = {"x": x, "u": u, **self._uncertain()}
+        rhs = self._vector(mode.system.dynamics, "dynamics", plant, mode.system.n)
+        if mode.memory is not None:
+            rhs += self._vector(mode.memory.dynamics, "memory dynamics", {**seen, "u": u}, mode.memory.k)
+        faces: list[Face] = []
+        if mode.constraints is not None:
+            returned = self._call(mode.constraints, "constraints", {**seen, "u": u, **self._uncertain()})
+            faces = faces_of(returned, f"{self.owner}, constraints")
+        tracking: list[Expr] = []
+        if mode.output is not None:
+            output = self._vector(mode.output, "output", {"x": x}, len(piece.value))
+            tracking = [y - value for y, value in zip(output, piece.value, strict=True)]
+        exprs = [*rhs, *inputs, *(face.expr for face in faces), *tracking]
+        instants = switching_times(exprs, self.time, piece.start, piece.end)
+        result = []
+        for start, end in pairwise([piece.start, *instants, piece.end]):
+            here = resolve(exprs, self.time, start, end)
+            self._require_resolved(here, start, end)
+            self._keep_obligations(exprs[: len(rhs) + len(inputs)], here[: len(rhs) + len(inputs)])
+            parts = iter(here)
+            result.append(
+                Segment(
+                    start=start,
+                    end=end,
+                    rhs=[next(parts) for _ in rhs],
+                    inputs=[next(parts) for _ in inputs],
+                    constraints=[Face(face.name, next(parts)) for face in faces],
+                    tracking=list(parts),
+                )
+            )
+        return result
+
+    def reset(self) -> list[Expr]:
+        """Memory on entry, with the reference at t = 0."""
+        memory, piece = self.mode.memory, self.pieces[0]
+        if memory is None:
+            return []
+        now = [at_instant(part, self.time, 0.0) for part in (piece.value, piece.dot, piece.ddot)]
+        available = {"x": fixed(self.x), "r": TracedReference.of(*now)}
+        return self._vector(memory.reset, "memory reset", available, memory.k)
+
+    def _uncertain(self) -> dict[str, Any]:
+        available: dict[str, Any] = {}
+        if self.w:
+            available["w"] = fixed(self.w)
+        if self.d:
+            available["d"] = self.d
+        return available
+
+    def _vector(self, function: Any, role: str, available: Mapping[str, Any], length: int) -> list[Expr]:
+        value = self._call(function, role, available)
+        return as_vector(value, length, role=role, owner=self.owner, graph=self.graph)
+
+    def _call(self, function: Any, role: str, available: Mapping[str, Any]) -> Any:
+        missing = [
+            name
+            for name in required_arguments(function, role=role, owner=self.owner)
+            if name in _HINTS and name not in available
+        ]
+        if missing:
+            raise ModegraphError(f"{self.owner}, {role} reads {missing[0]!r}, but {_hint(missing[0], role)}")
+        try:
+            return call(function, available, role=role, owner=self.owner)
+        except ModegraphError as error:
+            if "read-only" not in str(error):
+                raise
+            raise ModegraphError(
+                f"{error}; arguments must not be changed in place, begin with x = x.copy()"
+            ) from error
+
+    def _keep_obligations(self, written: Sequence[Expr], resolved: Sequence[Expr]) -> None:
+        """``maximum(t - 1, 0) / x[0]`` is 0 before t = 1, but only where x[0] is not."""
+        if not all(a.same(b) for a, b in zip(written, resolved, strict=True)):
+            lost = _obligations(self.graph, written) - _obligations(self.graph, resolved)
+            self.graph.dropped.extend(sorted(lost))
+
+    def _require_resolved(self, exprs: Sequence[Expr], start: float, end: float) -> None:
+        left = jumps(exprs, self.time)
+        if left:
+            until = "" if math.isinf(end) else f" and before t = {end:g}"
+            raise ModegraphError(
+                f"{self.owner}: {left[0].text(60)} may switch at an instant after t = {start:g}{until} that "
+                "cannot be determined; write it as np.where(t < b, ...) with a number b, and add the "
+                "switching instant to breakpoints= of the trajectory"
+            )
+
+
+def _obligations(graph: Graph, exprs: Sequence[Expr]) -> set[int]:
+    """Reciprocals and logarithms that are evaluated whatever branch a case distinction takes."""
+    seen: set[int] = set()
+    stack = [e.index for e in exprs]
+    while stack:
+        index = stack.pop()
+        if index in seen or not graph.partial[index]:
+            continue
+        seen.add(index)
+        node = graph.nodes[index]
+        stack.extend(k for k in ((node.c,) if node.op == WHERE else (node.a, node.b)) if k >= 0)
+    return {index for index in seen if graph.nodes[index].op in (RECIP, LOG)}
+
+
+_HINTS = ("w", "d", "z", "t", "u", "r")
+
+
+def _hint(name: str, role: str) -> str:
+    if name == "w" and role in ("dynamics", "constraints"):
+        return "the plant has no disturbance; declare it with System(..., disturbance=Box(...))"
+    if name == "d" and role in ("dynamics", "constraints"):
+        return "the plant has no unknown constants; declare them with System(..., unknowns={name: (lo, hi)})"
+    if name == "z" and role in ("controller", "memory dynamics", "constraints"):
+        return "the mode has no memory; declare it with Mode(..., memory=Memory(...))"
+    allowed = {
+        "dynamics": "x, u, w, d",
+        "controller": "x, r, t, z",
+        "memory dynamics": "x, u, r, t, z",
+        "memory reset": "x, r",
+        "constraints": "x, u, r, t, z, w, d",
+        "output": "x",
+    }[role]
+    return f"a function in this role may read only {allowed}"

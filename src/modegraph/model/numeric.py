@@ -1,0 +1,101 @@
+"""Calling a user's function with plain numbers, and checking that plain numbers come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from modegraph.errors import ModegraphError
+from modegraph.model.mode import Mode
+from modegraph.model.reference import Floats
+from modegraph.model.sets import Set
+
+
+def call_numeric(
+    function: Callable[..., Any], available: Mapping[str, object], *, role: str, owner: str
+) -> Any:
+    """Call a function with what it reads by name, untraced.
+
+    Parameters
+    ----------
+    available : {name: value}
+        What this role may read. A parameter with a default keeps it unless its name is listed here.
+    role, owner : str
+        For error messages, such as "controller" and "mode 'gentle'".
+
+    Raises
+    ------
+    ModegraphError
+        If the function asks for something else, or fails.
+    """
+    from modegraph.expression.trace import arguments
+
+    positional, keywords = arguments(function, available, role=role, owner=owner)
+    try:
+        return function(*positional, **keywords)
+    except ModegraphError as error:
+        raise type(error)(f"{owner}, {role}: {error}") from error
+    except Exception as error:
+        raise ModegraphError(f"{owner}, {role}: {type(error).__name__}: {error}") from error
+
+
+def require_finite_values(mode: Mode, p: Floats | None, start: Set) -> None:
+    """Call the mode's functions in floats at the centre of the start set, t = 0, w and d centred.
+
+    Raises
+    ------
+    ModegraphError
+        If one of them fails, or returns a wrong length, NaN or an infinity; names mode, function
+        and remedy.
+    """
+    owner = f"mode {mode.label_of(p)!r}"
+    n = mode.system.n
+    x, z = np.array(start.center[:n]), np.array(start.center[n:])
+    r = mode.reference.at(0.0, p)
+
+    def values(function: Any, available: dict[str, object], role: str, length: int | None) -> Floats:
+        with np.errstate(all="ignore"):
+            result = call_numeric(function, available, role=role, owner=owner)
+        return _finite_vector(result, length, f"{owner}, {role}", x)
+
+    memory = mode.memory
+    if memory is not None:
+        reset = values(memory.reset, {"x": x, "r": r}, "memory reset", memory.k)
+        z = z if z.size else reset
+    seen: dict[str, object] = {"x": x, "r": r, "t": 0.0}
+    if memory is not None:
+        seen["z"] = z
+    u = values(mode.controller, seen, "controller", mode.system.p)
+    plant: dict[str, object] = {"x": x, "u": u}
+    if mode.system.disturbance is not None:
+        plant["w"] = np.array(mode.system.disturbance.center)
+    if mode.system.unknowns:
+        plant["d"] = mode.system.unknown_centres()
+    values(mode.system.dynamics, plant, "dynamics", n)
+    if memory is not None:
+        values(memory.dynamics, {**seen, "u": u}, "memory dynamics", memory.k)
+    if mode.output is not None:
+        values(mode.output, {"x": x}, "output", None)
+
+
+def _finite_vector(result: Any, length: int | None, where: str, x: Floats) -> Floats:
+    try:
+        vector = np.asarray(result, dtype=float)
+    except (TypeError, ValueError):
+        raise ModegraphError(
+            f"{where} returned {result!r}, not a vector of numbers; return np.array([...])"
+        ) from None
+    if vector.ndim == 0 and length in (1, None):
+        vector = vector.reshape(1)
+    if vector.ndim != 1 or (length is not None and len(vector) != length):
+        wanted = "a vector" if length is None else f"shape ({length},)"
+        raise ModegraphError(f"{where} returned shape {vector.shape}, expected {wanted}")
+    if not np.isfinite(vector).all():
+        place = ", ".join(f"{value:.6g}" for value in x)
+        raise ModegraphError(
+            f"{where} returned {vector.tolist()} at x = ({place}), the centre of the start set; "
+            "look for a division by zero, or a logarithm or root of a number that is not positive"
+        )
+    return vector

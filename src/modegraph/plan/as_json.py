@@ -1,0 +1,93 @@
+"""Plans, verdicts and switches as plain data whose keys are the attribute names."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from modegraph.certify.references import References
+from modegraph.certify.verdict import Verdict
+from modegraph.graph.switch import Switch
+
+if TYPE_CHECKING:
+    from modegraph.plan.plan import Plan
+
+
+def plain(value: Any) -> Any:
+    """``value`` with arrays as lists and every number that JSON lacks (NaN, infinity) as None."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def json_text(data: Any) -> str:
+    """Strict JSON text of ``plain`` data."""
+    return json.dumps(plain(data), indent=2, allow_nan=False)
+
+
+def verdict_data(v: Verdict) -> dict[str, Any]:
+    """A verdict as data."""
+    witness = None
+    if v.witness is not None:
+        w = v.witness
+        witness = {
+            "x0": w.x0, "w": w.w, "d": dict(w.d), "r_i": w.r_i, "r_j": w.r_j, "time": w.time, "kind": w.kind,
+        }  # fmt: skip
+    return {
+        "status": v.status.value,
+        "reason": v.reason,
+        "time": v.time,
+        "margin": v.margin,
+        "slack": dict(v.slack),
+        "witness": witness,
+        "horizon": v.horizon,
+        "until": v.until,
+        "energy": v.energy,
+        "window": v.window,
+        "tracking": v.tracking,
+    }
+
+
+def references_data(refs: References) -> list[list[Any]]:
+    """The certified pairs ``[r_i, r_j]``."""
+    return [[r_i, r_j] for r_i, r_j in refs]
+
+
+def switch_data(s: Switch) -> dict[str, Any]:
+    """A switch as data."""
+    return {
+        "source": s.source,
+        "target": s.target,
+        "references": references_data(s.references),
+        "time": s.time,
+        "energy": s.energy,
+        "margin": s.margin,
+        "window": s.window,
+    }
+
+
+def plan_data(plan: Plan) -> dict[str, Any]:
+    """A plan as data."""
+    return {
+        "modes": plan.modes,
+        "references": plan.references,
+        "switches": [switch_data(s) for s in plan.switches],
+        "time": plan.time,
+        "energy": plan.energy,
+        "cost": plan.cost,
+        "margin": plan.margin,
+        "objective": plan.objective,
+        "goal_check": verdict_data(plan.goal_check),
+        "warnings": list(plan.warnings),
+    }

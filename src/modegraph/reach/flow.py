@@ -1,0 +1,468 @@
+"""The flowpipe of one piece: validated steps, with step control, and what is observed along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..enclosure.monomials import Monomials, monomials
+from ..enclosure.observe import enclose_at, observe_step
+from ..enclosure.rounding import UNIT
+from ..enclosure.step import (
+    DONE,
+    DROPPED,
+    JACOBIAN_UNDEFINED,
+    NO_CONTRACTION,
+    NO_GROWTH_BOUND,
+    SET_VARIABLE,
+    UNDEFINED,
+    flow_step,
+)
+from ..expression.tape import Tape
+from .bounds import PolynomialBounds
+from .field import Field
+from .grid import next_instant
+from .start import Piece
+
+Floats = NDArray[np.float64]
+
+TIME_DEGREE = 8
+JACOBIAN_TIME_DEGREE = 2
+FUNDAMENTAL_TIME_DEGREE = 5
+TOLERANCE = 1e-7
+"""Local error per second aimed at, relative to the size of the states."""
+GROWTH_CAP = 0.1
+"""Largest spectral radius of h M, M the bound of how far the Jacobian strays from its centre."""
+RATE_CAP = 1.0
+"""Largest spectral radius of h A0, A0 the Jacobian at the centre."""
+RUNAWAY_STEPS = 10
+"""A remainder that doubles over this many steps while they cover little time is given up."""
+DISTURBED_RATE_CAP = 0.3
+"""The same with a disturbance: its two columns a step are exact only as h A0 -> 0."""
+SMALLEST_STEP = 1e-7
+"""A flowpipe stops when its step falls below this part of the time scale of the loop."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """Degrees of the flowpipe: ``degree`` of p and ``jacobian`` of Psi and G in the set variables."""
+
+    degree: int
+    jacobian: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a flowpipe cannot go on: at what time, which mechanism, where, and what would help."""
+
+    time: float
+    mechanism: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"at t = {self.time:.6g} s {self.mechanism}; {self.remedy}"
+
+
+@dataclass
+class Step:
+    """One step, from ``start`` to ``end`` seconds.
+
+    p (n, N), G (ng, n, Nq): the set at the end. ``tube`` (n,) bounds e over the step, ``bend`` (n,)
+    the distance of p from its chord. ``face_upper``: proved upper bound of each constraint face over
+    the whole closed step (inf: not proved). ``energy``: polynomial of int u'u since entry, and its
+    radius. ``tracking``: upper bounds of |h(x) - r|.
+    """
+
+    start: float
+    end: float
+    p: Floats
+    G: Floats
+    tube: Floats
+    bend: Floats
+    face_upper: Floats
+    energy: Floats
+    energy_radius: float
+    tracking: Floats
+    segment: int
+
+
+def _workspace(tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
+    rows = tape.size
+    return {
+        "P": np.zeros((rows, K + 1, size)),
+        "dg": np.full((rows, K + 1), -1, np.int64),
+        "norms": np.zeros((rows, K + 1, degree + 1)),
+        "R": np.zeros(rows),
+        "kinks": np.zeros((rows, 2)),
+        "ranges": np.full((rows, 2), np.nan),
+    }
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """The table of the Jacobian: set variables, and one more variable for the error of each state.
+
+    ``embed``, ``owner`` and ``variables`` are as ``flow_step`` takes them.
+    """
+
+    table: Monomials
+    embed: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    variables: NDArray[np.int64]
+
+
+@lru_cache(maxsize=64)
+def _error_table(m: int, q: int, n: int) -> ErrorTable:
+    order = max(q, 1)
+    table = monomials((1,) * m + (1 if order <= 2 else 2,) * n, order)
+    owner = np.full(table.size, SET_VARIABLE, np.int64)
+    owner[table.degree > q] = DROPPED
+    for v in range(n):
+        owner[table.exponents[:, m + v] > 0] = v
+    plain = monomials((1,) * m, order)
+    index = {tuple(e): k for k, e in enumerate(table.exponents.tolist())}
+    count = int(plain.start[q + 1])
+    embed = np.array([index[(*e, *(0,) * n)] for e in plain.exponents[:count].tolist()], np.int64)
+    return ErrorTable(table, embed, owner, table.linear[m:].copy())
+
+
+def error_table(table: Monomials, q: int, n: int) -> ErrorTable:
+    """The Jacobian's table for a flowpipe over ``table`` with Psi and G of degree q, n states."""
+    return _error_table(table.variables, q, n)
+
+
+class Flow:
+    """Flowpipe of one piece of the starts of one mode, extended step by step.
+
+    Parameters
+    ----------
+    fields : one compiled field per segment of the reference.
+    piece : starts and unknowns.
+    w_centre, w_radius : (q,) the disturbance set; for a fixed disturbance the radius is 0.
+    order : degrees.
+    states, extra : (n, N) polynomials of the start and a box (n,) of what they miss, when they are
+        not the piece's own (memory reset to a function of the state).
+    """
+
+    def __init__(
+        self,
+        fields: Sequence[Field],
+        piece: Piece,
+        w_centre: Floats,
+        w_radius: Floats,
+        order: Order,
+        *,
+        names: Sequence[str],
+        reset: Tape | None = None,
+        stops: Sequence[float] = (),
+        t0: float = 0.0,
+    ) -> None:
+        self.fields = list(fields)
+        self.piece = piece
+        self.order = order
+        self.names = list(names)
+        self.w_centre, self.w_radius = w_centre, w_radius
+        self.table: Monomials = monomials((1,) * piece.variables, order.degree)
+        q = min(order.jacobian, order.degree)
+        self.small = int(self.table.start[q + 1])
+        self.q = q
+        self.failure: Failure | None = None
+        self.time = t0
+        self.segment = 0
+        while self.fields[self.segment].end <= t0:
+            self.segment += 1
+        self.stops = sorted(s for s in stops if s > t0)
+        self.steps: list[Step] = []
+        self.h = 0.0
+        n = self.fields[0].states
+        self.bounds = PolynomialBounds(piece, self.table, self.table.size)
+        self.small_bounds = PolynomialBounds(piece, self.table, self.small)
+        p, unknowns, slack = piece.polynomials(self.table.linear, self.table.size)
+        self._unknowns = unknowns
+        self._errors = error_table(self.table, self.q, n)
+        self._spaces: dict[tuple[int, str], dict[str, Any]] = {}
+        self._cut = np.full(TIME_DEGREE + 1, order.degree, np.int64)
+        if order.degree > 3:
+            # The degree kept falls with the power of time: the dropped part is in the defect.
+            fall = np.array([0, 0, 0, 1, 1, 2, 2, 2, 2])
+            self._cut = np.maximum(order.degree - fall, 2).astype(np.int64)
+        G = np.zeros((0, n, self.small))
+        self.undefined_start = False
+        if reset is not None and p.shape[0] < n:
+            p, slack = self._with_memory(p, slack, reset)
+        if slack.any():
+            G = np.zeros((n, n, self.small))
+            G[np.arange(n), np.arange(n), 0] = slack * (1.0 + 4.0 * UNIT)
+        self.p0, self.G0 = p, G
+        self._p, self._G = p, G
+        self._ebox = np.zeros(n)
+        self._energy = np.zeros(self.small)
+        self._energy_radius = 0.0
+        self._sizes: list[float] = []
+        self._longest = 0.0
+
+    # -- the start -------------------------------------------------------------------------------
+
+    def _with_memory(self, p: Floats, slack: Floats, reset: Tape) -> tuple[Floats, Floats]:
+        """Append z = reset(x) to the states of the start."""
+        k = len(reset.outputs)
+        inputs = np.zeros((len(reset.variables), self.table.size))
+        inputs[: len(p)] = p
+        radius = np.zeros(len(reset.variables))
+        radius[: len(p)] = slack
+        z, off, bad = self.evaluate(reset, inputs, radius)
+        if bad >= 0 or not np.isfinite(off).all():
+            label = reset.labels[max(bad, 0)]
+            self.failure = Failure(
+                0.0, f"the reset of the memory is not defined on the whole start set ({label})", "shrink the start set"
+            )
+            off = np.zeros(k)
+        return np.vstack([p, z]), np.concatenate([slack, off])
+
+    def evaluate(self, tape: Tape, inputs: Floats, radius: Floats) -> tuple[Floats, Floats, int]:
+        """Outputs of a tape at one instant: polynomials (no, N), radii (no,), first undefined row or -1."""
+        space = _workspace(tape, 0, self.table.size, self.order.degree)
+        cut = np.array([self.order.degree], np.int64)
+        return enclose_at(
+            tape.ops, tape.const, tape.const_rad, tape.outputs, tape.variables,
+            np.ascontiguousarray(inputs), np.ascontiguousarray(radius, float), cut, self.table.pairs,
+            space["P"], space["dg"], space["norms"], space["R"], space["kinks"], space["ranges"],
+            *self.table.arrays,
+        )  # fmt: skip
+
+    def variables_at(self, t: float, p: Floats, G: Floats, fld: Field) -> tuple[Floats, Floats]:
+        """Polynomials (nv, N) and radii (nv,) of all tape variables at one instant."""
+        inputs = np.zeros((fld.variables, self.table.size))
+        inputs[: fld.states] = p
+        inputs[fld.time_index, 0] = t
+        inputs[fld.first_w : fld.first_d, 0] = self.w_centre
+        inputs[fld.first_d :] = self._unknowns
+        radius = np.zeros(fld.variables)
+        radius[: fld.states] = generator_box(G)
+        radius[fld.first_w : fld.first_d] = self.w_radius
+        return inputs, radius
+
+    def faces_at(self, t: float, p: Floats, G: Floats, segment: int) -> Floats:
+        """Proved upper bound of every constraint face at one instant, with the inputs of ``segment``."""
+        fld = self.fields[segment]
+        if not fld.faces:
+            return np.zeros(0)
+        inputs, radius = self.variables_at(t, p, G, fld)
+        value, off, _ = self.evaluate(fld.observed, inputs, radius)
+        return np.asarray(self.bounds.upper(value[: len(fld.faces)]) + off[: len(fld.faces)])
+
+    # -- stepping --------------------------------------------------------------------------------
+
+    def _space(self, kind: str, tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
+        key = (self.segment, kind)
+        if key not in self._spaces:
+            self._spaces[key] = _workspace(tape, K, size, degree)
+        return self._spaces[key]
+
+    def _first_step(self) -> float:
+        fld = self.fields[self.segment]
+        span = 1.0 if np.isinf(fld.end) else fld.end - self.time
+        return min(0.05, span)
+
+    def advance(self, limit: float) -> bool:
+        """One step towards ``limit``; False when the flowpipe has failed."""
+        if self.failure is not None:
+            return False
+        fld = self.fields[self.segment]
+        if self.h <= 0.0:
+            self.h = self._first_step()
+        stop = min([limit, fld.end, *(s for s in self.stops if s > self.time)][:3])
+        h_try = self.h
+        for _ in range(60):
+            t1 = next_instant(self.time, h_try, stop)
+            h = t1 - self.time
+            outcome = self._attempt(fld, h)
+            status, node, p, G, tube, bend, defect, control = outcome
+            scale = TOLERANCE * (1.0 + np.abs(self._p[:, 0]).max())
+            if status == DONE:
+                rate = control[0] / h
+                floor = max(scale, 0.3 * control[1] / h)
+                factor = 1.6 if rate <= 0.0 else min(1.6, max(0.3, 0.9 * (floor / rate) ** (1.0 / TIME_DEGREE)))
+                if rate > 4.0 * floor and h > 1e-4:
+                    h_try = h * min(0.8, factor)
+                    continue
+                caps = min((cap / value for value, cap in ((control[2], GROWTH_CAP), (control[3], RATE_CAP if not self.w_radius.any() else DISTURBED_RATE_CAP)) if value > 0.0), default=1.6)
+                if caps < 0.5 and h > 1e-4:
+                    h_try = h * caps
+                    continue
+                factor = min(factor, caps)
+                self.h = h * max(0.1, factor) if h > 0.5 * h_try else h_try
+                break
+            h_try = 0.4 * h
+            if h_try < SMALLEST_STEP:
+                self._fail(fld, status, node)
+                return False
+        else:
+            self._fail(fld, NO_CONTRACTION, 0)
+            return False
+        self._record(fld, t1, p, G, tube, bend)
+        if not np.isfinite(p).all() or self._runs_away(G):
+            self._fail(fld, NO_CONTRACTION, 0)
+            return False
+        return True
+
+    def _runs_away(self, G: Floats) -> bool:
+        """Whether the remainder has begun its last growth: it feeds itself while the steps shrink."""
+        size = float(generator_box(G).max(initial=0.0))
+        self._sizes.append(size)
+        self._longest = max(self._longest, self.steps[-1].end - self.steps[-1].start)
+        back = RUNAWAY_STEPS
+        if len(self._sizes) <= back or size == 0.0:
+            return False
+        advanced = self.time - self.steps[-back].start
+        return size > 2.0 * self._sizes[-back - 1] and advanced < 0.35 * back * self._longest
+
+    def _attempt(self, fld: Field, h: float) -> Any:
+        f, j = fld.rates, fld.jacobian
+        K, KJ = TIME_DEGREE, JACOBIAN_TIME_DEGREE
+        big = self._space("f", f, K, self.table.size, self.order.degree)
+        jac = self._space("j", j, KJ, self._errors.table.size, self._errors.table.order)
+        inputs = np.zeros((fld.variables, self.table.size))
+        inputs[: fld.states] = self._p
+        inputs[fld.time_index, 0] = self.time
+        inputs[fld.first_w : fld.first_d, 0] = self.w_centre
+        inputs[fld.first_d :] = self._unknowns
+        n = fld.states
+        most = (30 if self.w_radius.any() else 12) * n + 8
+        moving = self.w_radius if self.w_radius.any() else np.zeros(0)
+        outputs = j.outputs
+        if not len(moving):
+            outputs = np.concatenate([outputs[: n * n], outputs[n * n + n * fld.disturbances :]])
+        return flow_step(
+            f.ops, f.const, f.const_rad, f.outputs, f.variables,
+            j.ops, j.const, j.const_rad, outputs, j.variables,
+            n, inputs, self._G, moving, fld.full_w and len(moving) > 0, fld.first_w, fld.time_index,
+            h, K, self._cut, KJ, self.q, FUNDAMENTAL_TIME_DEGREE,
+            self.table.pairs, most, self._ebox,
+            big["P"], big["dg"], big["norms"], big["R"], big["kinks"], big["ranges"],
+            jac["P"], jac["dg"], jac["norms"], jac["R"], jac["kinks"], jac["ranges"],
+            *self.table.arrays, *self._errors.table.arrays, self._errors.table.pairs,
+            np.full(KJ + 1, self._errors.table.order, np.int64), self._errors.embed, self._errors.owner,
+            self._errors.variables,
+        )  # fmt: skip
+
+    def _record(self, fld: Field, t1: float, p: Floats, G: Floats, tube: Floats, bend: Floats) -> None:
+        face_upper, mean, mean_radius, tracking = self._observe(fld, t1 - self.time, tube)
+        h = t1 - self.time
+        self._energy = self._energy + h * mean
+        rounding = 4.0 * UNIT * float(np.abs(self._energy).sum() + h * np.abs(mean).sum())
+        self._energy_radius = (self._energy_radius + h * mean_radius + rounding) * (1.0 + 8.0 * UNIT)
+        self.steps.append(
+            Step(
+                self.time, t1, p, G, tube, bend, face_upper, self._energy, self._energy_radius, tracking, self.segment
+            )
+        )
+        self._p, self._G, self._ebox, self.time = p, G, tube, t1
+        if t1 >= fld.end:
+            self.segment += 1
+            self.h = min(self.h, 0.05)
+
+    def _observe(self, fld: Field, h: float, tube: Floats) -> tuple[Floats, Floats, float, Floats]:
+        faces = len(fld.faces)
+        ends, slack = self._observed(fld, h, tube, self.q, 3)
+        upper = self._face_upper(self.small_bounds, ends, slack, faces)
+        if faces and not (upper <= 0.0).all():
+            fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, TIME_DEGREE)
+            fine = self._face_upper(self.bounds, fine_ends, fine_slack, faces)
+            for i in np.flatnonzero(~(fine <= 0.0)):
+                if np.isfinite(fine_slack[i, 0]):
+                    limit = -fine_slack[i, 0]
+                    tops = [self.bounds.refined_upper(fine_ends[s, i], limit) for s in (0, 1)]
+                    fine[i] = min(fine[i], max(tops) + fine_slack[i, 0])
+            upper = np.minimum(upper, fine)
+        upper = np.where(np.isnan(upper), np.inf, upper)
+        # Ends are added and compared in floats: one rounding each.
+        upper = upper + 4.0 * UNIT * np.abs(upper)
+        errors = ends[:2, faces + 1 :]
+        both = np.maximum(self.small_bounds.upper(errors), self.small_bounds.upper(-errors)).max(axis=0)
+        tracking = both + slack[faces + 1 :, 0]
+        return upper, ends[2, faces], float(slack[faces, 1]), tracking
+
+    def _face_upper(self, bounds: PolynomialBounds, ends: Floats, slack: Floats, faces: int) -> Floats:
+        if not faces:
+            return np.zeros(0)
+        return np.asarray(bounds.upper(ends[:2, :faces]).max(axis=0) + slack[:faces, 0])
+
+    def _observed(self, fld: Field, h: float, tube: Floats, q: int, K: int) -> tuple[Floats, Floats]:
+        o = fld.observed
+        size = int(self.table.start[q + 1])
+        space = self._space(f"o{q},{K}", o, K, size, q)
+        big = self._spaces[(self.segment, "f")]
+        radius = np.zeros(fld.variables)
+        radius[: fld.states] = tube
+        radius[fld.first_w : fld.first_d] = self.w_radius
+        return observe_step(
+            big["P"], big["dg"], big["norms"], fld.rates.variables,
+            o.ops, o.const, o.const_rad, o.outputs, o.variables, radius, h, K, np.full(K + 1, q, np.int64),
+            self.table.pairs, space["P"], space["dg"], space["norms"], space["R"], space["kinks"],
+            space["ranges"], *self.table.arrays,
+        )  # fmt: skip
+
+    def _fail(self, fld: Field, status: int, node: int) -> None:
+        widths = generator_box(self._G)
+        worst = self.names[int(np.argmax(widths))] if len(widths) else ""
+        if status == UNDEFINED:
+            what = f"a function leaves its domain: {fld.rates.labels[node]}"
+            help_ = "keep the starts away from there, or shrink the start set"
+        elif status == JACOBIAN_UNDEFINED:
+            what = f"a function of the loop is not defined, or not continuous, on the whole set: {fld.jacobian.labels[node]}"
+            help_ = "keep the starts away from there, or shrink the start set"
+        elif status == NO_GROWTH_BOUND:
+            what = f"the error bound cannot be closed for any step (state '{worst}' is the widest): the set has grown too far"
+            help_ = "shrink or split the start set, or shorten the horizon"
+        else:
+            what = f"the remainder does not contract (state '{worst}' is the widest)"
+            help_ = "shrink or split the start set, or shorten the horizon"
+        self.failure = Failure(self.time, what, help_)
+
+    def run(self, limit: float) -> bool:
+        """Advance until ``limit``; False when the flowpipe failed before."""
+        while self.time < limit:
+            if not self.advance(limit):
+                return False
+        return True
+
+    # -- what it says ----------------------------------------------------------------------------
+
+    @property
+    def times(self) -> Floats:
+        """Grid instants, start included."""
+        return np.array([self.steps[0].start if self.steps else self.time, *(s.end for s in self.steps)])
+
+    def set_at(self, k: int) -> tuple[Floats, Floats]:
+        """(p, G) at grid instant k."""
+        if k == 0:
+            return self.p0, self.G0
+        return self.steps[k - 1].p, self.steps[k - 1].G
+
+    def hulls(self) -> tuple[Floats, Floats]:
+        """Boxes (steps + 1, n) of the sets at the grid instants."""
+        polynomials = np.stack([self.set_at(k)[0] for k in range(len(self.steps) + 1)])
+        z = np.stack([generator_box(self.set_at(k)[1]) for k in range(len(self.steps) + 1)])
+        lo, hi = self.bounds.ranges(polynomials)
+        return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
+
+    def tubes(self) -> tuple[Floats, Floats]:
+        """Boxes (steps, n) of everything passed during each closed step."""
+        polynomials = np.stack([self.set_at(k)[0] for k in range(len(self.steps) + 1)])
+        lo, hi = self.bounds.ranges(polynomials)
+        out = np.stack([s.bend + s.tube for s in self.steps])
+        below = np.minimum(lo[:-1], lo[1:]) - out
+        above = np.maximum(hi[:-1], hi[1:]) + out
+        return np.nextafter(below, -np.inf), np.nextafter(above, np.inf)
+
+
+def generator_box(G: Floats) -> Floats:
+    """Radii (n,) of a box around sum_g G_g(xi) zeta_g, rounded up."""
+    count = G.shape[0] * G.shape[2]
+    return np.asarray(np.abs(G).sum(axis=(0, 2)) * (1.0 + (count + 4) * UNIT * 2.0))

@@ -1,0 +1,245 @@
+"""Start sets as polynomials: every start is c + L xi for one xi in the domain of a piece.
+
+A piece is a box of xi (and of the unknown constants), cut with the unit ball for Ball and Ellipsoid
+starts and with the faces for Polytopes. Pieces are what splitting makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..enclosure.rounding import UNIT
+from ..errors import ModegraphError
+from ..model.sets.ball import Ball
+from ..model.sets.base import Set
+from ..model.sets.box import Box
+from ..model.sets.ellipsoid import Ellipsoid
+from ..model.sets.polytope import Polytope
+from ..model.sets.zonotope import Zonotope
+from .field import cover
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """{c + L xi : xi in [-1, 1]^m}, optionally |xi|_2 <= 1, encloses a start set; plus the unknowns.
+
+    ``faces`` (A, b): A xi <= b holds for every start, for Polytopes (rounded outward).
+    """
+
+    centre: Floats
+    axes: Floats
+    round: bool
+    faces: tuple[Floats, Floats] | None
+    unknown_lo: Floats
+    unknown_hi: Floats
+
+    @property
+    def free(self) -> int:
+        """Number m of variables of the start itself."""
+        return self.axes.shape[1]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of the start set and of the unknowns: lo <= (xi, unknowns scaled to [-1, 1]) <= hi.
+
+    Unknown constants with lo = hi are no variables.
+    """
+
+    chart: Chart
+    lo: Floats
+    hi: Floats
+    depth: int = 0
+
+    @cached_property
+    def uncertain(self) -> NDArray[np.int64]:
+        """Indices of the unknown constants that are not known exactly."""
+        return np.flatnonzero(self.chart.unknown_lo < self.chart.unknown_hi)
+
+    @property
+    def variables(self) -> int:
+        return len(self.lo)
+
+    @cached_property
+    def middle(self) -> Floats:
+        return cover(self.lo, self.hi)[0]
+
+    @cached_property
+    def radius(self) -> Floats:
+        return cover(self.lo, self.hi)[1]
+
+    def polynomials(self, linear: NDArray[np.int64], size: int) -> tuple[Floats, Floats, Floats]:
+        """States (n, size), unknowns (nd, size) over the monomial table, and a rounding box (n,).
+
+        The variables of the table are the piece scaled to [-1, 1]; ``linear`` are their monomials.
+        """
+        chart = self.chart
+        m = chart.free
+        n = len(chart.centre)
+        states = np.zeros((n, size))
+        states[:, 0] = chart.centre + chart.axes @ self.middle[:m]
+        for v in range(m):
+            states[:, linear[v]] = chart.axes[:, v] * self.radius[v]
+        slack = (np.abs(chart.centre) + np.abs(chart.axes).sum(axis=1)) * (m + 4) * 2.0 * UNIT
+        exact = (self.middle[:m] == 0.0) & (self.radius[:m] == 1.0)
+        if exact.all():
+            slack = np.zeros(n)
+        unknowns = np.zeros((len(chart.unknown_lo), size))
+        unknowns[:, 0] = chart.unknown_lo
+        for k, i in enumerate(self.uncertain):
+            lo, hi = self.unknown_range(int(i))
+            centre, radius = cover(np.array([lo]), np.array([hi]))
+            unknowns[i, 0] = centre[0]
+            unknowns[i, linear[m + k]] = radius[0]
+        return states, unknowns, slack
+
+    def unknown_range(self, i: int) -> tuple[float, float]:
+        """Interval of unknown i in this piece, rounded outward."""
+        lo, hi = float(self.chart.unknown_lo[i]), float(self.chart.unknown_hi[i])
+        k = self.chart.free + int(np.searchsorted(self.uncertain, i))
+        a, b = float(self.lo[k]), float(self.hi[k])
+        left = lo if a == -1.0 else np.nextafter(lo + 0.5 * (a + 1.0) * (hi - lo), -np.inf)
+        right = hi if b == 1.0 else np.nextafter(lo + 0.5 * (b + 1.0) * (hi - lo), np.inf)
+        slack = 4.0 * UNIT * max(abs(lo), abs(hi))
+        left = lo if a == -1.0 else max(lo, left - slack)
+        right = hi if b == 1.0 else min(hi, right + slack)
+        return float(left), float(right)
+
+    def split(self, variable: int) -> list[Piece]:
+        """Two halves along one variable, tightened; a half that holds no start is left out."""
+        middle = 0.5 * (self.lo[variable] + self.hi[variable])
+        halves = []
+        for side in (0, 1):
+            lo, hi = self.lo.copy(), self.hi.copy()
+            (hi if side == 0 else lo)[variable] = middle
+            piece = replace(self, lo=lo, hi=hi, depth=self.depth + 1).tightened()
+            if piece is not None:
+                halves.append(piece)
+        return halves
+
+    def tightened(self) -> Piece | None:
+        """The smallest box around what the ball or the faces leave of it; None if nothing is left."""
+        m = self.chart.free
+        lo, hi = self.lo.copy(), self.hi.copy()
+        if self.chart.round:
+            nearest = np.maximum(0.0, np.maximum(lo[:m], -hi[:m]))
+            square = nearest**2 * (1.0 - 4.0 * UNIT)
+            total = square.sum() * (1.0 - 2.0 * m * UNIT)
+            if total > 1.0:
+                return None
+            room = np.sqrt(np.maximum(0.0, 1.0 - (total - square) * (1.0 - 4.0 * UNIT) + 8.0 * m * UNIT))
+            room = room * (1.0 + 4.0 * UNIT)
+            lo[:m] = np.maximum(lo[:m], -room)
+            hi[:m] = np.minimum(hi[:m], room)
+        if self.chart.faces is not None:
+            A, b = self.chart.faces
+            for _ in range(3):
+                for a, bound in zip(A, b, strict=True):
+                    low = np.where(a > 0.0, a * lo[:m], a * hi[:m])
+                    slack = 4.0 * (m + 2) * UNIT * (np.abs(a).sum() + abs(bound))
+                    if low.sum() - slack > bound:
+                        return None
+                    for v in np.flatnonzero(a):
+                        rest = (bound + slack - (low.sum() - low[v])) / a[v]
+                        rest += np.sign(a[v]) * 4.0 * UNIT * (abs(rest) + 1.0)
+                        if a[v] > 0.0:
+                            hi[v] = min(hi[v], rest)
+                        else:
+                            lo[v] = max(lo[v], rest)
+        if (lo > hi).any():
+            return None
+        return replace(self, lo=lo, hi=hi)
+
+    def linear_bound(self, coefficients: Floats) -> Floats:
+        """sup over the piece of sum_v coefficients[..., v] eta_v, eta the scaled variables; rounded up.
+
+        For round starts the bound from the unit ball is used where it is smaller.
+        """
+        size = np.abs(coefficients)
+        box = size.sum(axis=-1)
+        if not self.chart.round or self.chart.free == 0:
+            return box * (1.0 + 4.0 * len(self.lo) * UNIT)
+        m = self.chart.free
+        radius = np.maximum(self.radius[:m], 1e-300)
+        plain = coefficients[..., :m] / radius
+        with np.errstate(over="ignore"):
+            ball = np.sqrt((plain**2).sum(axis=-1)) - plain @ self.middle[:m]
+        ball = ball + size[..., m:].sum(axis=-1)
+        slack = (np.abs(plain).sum(axis=-1) + box) * (8.0 * (m + 4)) * UNIT
+        return np.asarray(np.fmin(box * (1.0 + 4.0 * len(self.lo) * UNIT), ball + slack))
+
+
+def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
+    """The piece that covers a bounded start set and all unknown constants."""
+    centre, axes, ball, faces = _chart(start)
+    lo = np.array([u[0] for u in unknowns], float)
+    hi = np.array([u[1] for u in unknowns], float)
+    chart = Chart(centre, axes, ball, faces, lo, hi)
+    m = axes.shape[1] + int((lo < hi).sum())
+    piece = Piece(chart, -np.ones(m), np.ones(m)).tightened()
+    if piece is None:
+        raise ModegraphError("the start set is empty: no edge can be proved from it")
+    return piece
+
+
+def point(x0: Floats, unknowns: Sequence[float]) -> Piece:
+    """One start with known constants: no variable at all."""
+    values = np.asarray(unknowns, float)
+    chart = Chart(np.asarray(x0, float), np.zeros((len(x0), 0)), False, None, values, values)
+    return Piece(chart, np.zeros(0), np.zeros(0))
+
+
+def _chart(start: Set) -> tuple[Floats, Floats, bool, tuple[Floats, Floats] | None]:
+    if isinstance(start, Ball):
+        n = start.dim
+        axes = np.eye(n) * float(start.radius)
+        return np.array(start.c, float), axes if start.radius > 0 else np.zeros((n, 0)), True, None
+    if isinstance(start, Ellipsoid):
+        return np.array(start.c, float), _ellipsoid_axes(start), True, None
+    if isinstance(start, Zonotope):
+        generators = np.array(start.generators, float)
+        return np.array(start.c, float), generators[:, np.abs(generators).sum(axis=0) > 0], False, None
+    lo, hi = (np.asarray(side, float) for side in start.bounding_box())
+    centre, radius = cover(lo, hi)
+    free = np.flatnonzero(radius > 0.0)
+    axes = np.diag(radius)[:, free]
+    faces = None
+    if isinstance(start, Polytope):
+        A = np.array(start.A, float)
+        scaled = A @ axes
+        size = np.abs(A) @ (np.abs(centre) + radius)
+        bound = np.array(start.b, float) - A @ centre
+        faces = scaled, bound + 8.0 * (len(lo) + 4) * UNIT * (size + np.abs(start.b))
+    elif not isinstance(start, Box):
+        raise ModegraphError(f"a {type(start).__name__} cannot be a start set yet; use a Box, Ball, Ellipsoid, Zonotope or Polytope")
+    return centre, axes, False, faces
+
+
+def _ellipsoid_axes(start: Ellipsoid) -> Floats:
+    """L with shape <= L L' (so that c + L (unit ball) covers the ellipsoid), floats checked upward."""
+    shape = np.array(start.shape, float)
+    diagonal = np.diag(shape)
+    if not (shape - np.diag(diagonal)).any():
+        return np.diag(np.nextafter(np.sqrt(diagonal), np.inf))
+    scale = np.sqrt(diagonal)
+    L = scale[:, None] * np.linalg.cholesky(shape / np.outer(scale, scale))
+    T = np.linalg.inv(L)
+    # lambda_max(T shape T') <= |T shape T'|_inf; the product itself is off by gamma(2 n) |T||shape||T'|.
+    n = len(scale)
+    product = T @ shape @ T.T
+    error = 4.0 * n * UNIT * (np.abs(T) @ np.abs(shape) @ np.abs(T.T))
+    largest = float((np.abs(product) + error).sum(axis=1).max()) * (1.0 + 8.0 * n * UNIT)
+    # |L^-1 y| <= |(T L)^-1| |T y| and |(T L)^-1|_2 <= 1 / (1 - |T L - I|_2).
+    miss = np.abs(T @ L - np.eye(n)) + 2.0 * n * UNIT * (np.abs(T) @ np.abs(L))
+    off = float(miss.sum(axis=1).max()) * np.sqrt(n) * (1.0 + 8.0 * n * UNIT)
+    growth = 1.0 / (1.0 - off) if off < 0.01 else np.nan
+    if not np.isfinite(growth):
+        raise ModegraphError("the ellipsoid's shape is too close to singular; scale its coordinates")
+    return np.asarray(L * (np.sqrt(largest) * growth * (1.0 + 1e-12)))

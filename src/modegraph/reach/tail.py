@@ -1,0 +1,245 @@
+"""All time after some instant: an invariant set around the equilibrium (recipe: restart and return).
+
+A parallelotope B that contains the reach set is taken as a start set of its own; when its flow lies
+inside B again, B is invariant for the sampled loop, and the flow in between covers all later time.
+Valid because the last segment does not depend on time and the class of disturbances does not either.
+Containment in B holds for all unknown constants at once, hence for each of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..enclosure.rounding import UNIT
+from ..expression.evaluate import Evaluator
+from .field import Field
+from .flow import Flow, Order, generator_box
+from .start import Chart, Piece
+
+Floats = NDArray[np.float64]
+
+FLOOR = 0.3
+"""Least semi-axis of B relative to the largest, so that its aspect ratio is harmless."""
+
+
+@dataclass(frozen=True)
+class Tail:
+    """From ``start`` seconds on every trajectory stays in ``flow``'s tube for ever.
+
+    ``face_upper`` bounds each constraint face for all t >= start; ``tracking`` likewise |h(x) - r|.
+    ``lo``, ``hi`` (n,): a box around everything after ``start`` (infinite in states nothing reads).
+    """
+
+    start: float
+    face_upper: Floats
+    tracking: Floats
+    lo: Floats
+    hi: Floats
+
+
+@dataclass(frozen=True)
+class TailFailure:
+    """Why no invariant set was found."""
+
+    reason: str
+
+
+def relevant_states(fld: Field) -> list[int]:
+    """States that a constraint reads, or that feed back into such a state or into themselves."""
+    keep = set(range(fld.states))
+    while True:
+        readers = {k: [i for i in keep if k in fld.reads[i]] for k in keep}
+        idle = [k for k in keep if not readers[k] and k not in fld.observed_states]
+        if not idle:
+            return sorted(keep)
+        keep -= set(idle)
+
+
+class TailSearch:
+    """Tries, at instants of a set of flows, to close the time axis."""
+
+    def __init__(
+        self,
+        fld: Field,
+        chart: Chart,
+        w_centre: Floats,
+        w_radius: Floats,
+        names: Sequence[str],
+        order: Order,
+    ) -> None:
+        self.fld = fld
+        self.chart = chart
+        self.w_centre, self.w_radius = w_centre, w_radius
+        self.names = names
+        self.order = order
+        self.states = relevant_states(fld)
+        self.possible = bool(np.isinf(fld.end)) and fld.autonomous
+        self._evaluate = Evaluator(fld.rates)
+        self._slope = Evaluator(fld.jacobian)
+
+    def _inputs(self, x: Floats) -> Floats:
+        middle = 0.5 * (self.chart.unknown_lo + self.chart.unknown_hi)
+        return np.concatenate([x, [self.fld.start], self.w_centre, middle])[:, None]
+
+    def _jacobian(self, x: Floats) -> Floats:
+        n = self.fld.states
+        return np.asarray(self._slope(self._inputs(x))[: n * n, 0].reshape(n, n))
+
+    def _equilibrium(self, x: Floats) -> Floats | None:
+        """Newton's method in the relevant states (floats: any centre is sound)."""
+        keep = self.states
+        x = x.copy()
+        for _ in range(12):
+            rate = self._evaluate(self._inputs(x))[keep, 0]
+            slope = self._jacobian(x)[np.ix_(keep, keep)]
+            step = np.linalg.lstsq(slope, -rate, rcond=1e-12)[0]
+            if not np.isfinite(step).all():
+                return None
+            x[keep] += step
+            if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + np.abs(x).max()):
+                break
+        return x if np.isfinite(x).all() else None
+
+    def _frames(self, slope: Floats) -> list[Floats]:
+        """Candidate axes: modal (real and imaginary parts of eigenvectors), then the coordinates."""
+        k = len(slope)
+        frames = []
+        values, vectors = np.linalg.eig(slope)
+        columns = []
+        for i, value in enumerate(values):
+            if value.imag > 0.0:
+                columns += [vectors[:, i].real, vectors[:, i].imag]
+            elif value.imag == 0.0:
+                columns.append(vectors[:, i].real)
+        if len(columns) == k:
+            modal = np.array(columns).T
+            scale = np.linalg.norm(modal, axis=0)
+            if (scale > 0.0).all() and np.linalg.cond(modal / scale) < 1e4:
+                frames.append(modal / scale)
+        frames.append(np.eye(k))
+        return frames
+
+    def attempt(self, flows: Sequence[Flow]) -> Tail | TailFailure:
+        """Try from the present end of the flows (all the pieces of the starts)."""
+        if not self.possible:
+            return TailFailure("the loop still depends on time")
+        keep = self.states
+        n = self.fld.states
+        if any(flow.time < self.fld.start for flow in flows):
+            return TailFailure("the reference still moves")
+        start = max(flow.time for flow in flows)
+        if not keep:
+            return self._nothing_moves(flows, start)
+        hulls = [flow.hulls() for flow in flows]
+        lo = np.min([h[0][-1] for h in hulls], axis=0)
+        hi = np.max([h[1][-1] for h in hulls], axis=0)
+        centre = self._equilibrium(0.5 * (lo + hi))
+        if centre is None:
+            return TailFailure("no equilibrium was found near the end of the flowpipe")
+        slope = self._jacobian(centre)[np.ix_(keep, keep)]
+        if not np.isfinite(slope).all():
+            return TailFailure("the Jacobian at the equilibrium is not finite")
+        decay = -np.linalg.eigvals(slope).real.max()
+        if not decay > 1e-9:
+            return TailFailure(
+                "the loop does not settle: its slowest mode has the rate "
+                f"{-decay:.3g} 1/s, so nothing can be said for all time"
+            )
+        reason = ""
+        for frame in self._frames(slope):
+            axes = np.zeros((n, len(keep)))
+            axes[keep] = frame
+            widest = np.zeros(len(keep))
+            inverse = np.linalg.inv(frame)
+            for flow in flows:
+                p, G = flow.set_at(len(flow.steps))
+                q = inverse @ (p[keep] - np.where(np.arange(p.shape[1]) == 0, centre[keep][:, None], 0.0))
+                g = np.abs(np.einsum("fi,gin->fgn", inverse, G[:, keep])).sum(axis=(1, 2))
+                widest = np.maximum(widest, np.maximum(flow.bounds.upper(q), flow.bounds.upper(-q)) + g)
+            size = np.maximum(widest * 1.02, FLOOR * widest.max())
+            if self.w_radius.any():
+                size = np.maximum(size, self._disturbed_size(inverse, slope, centre))
+            for growth in (1.0, 1.6):
+                found = self._returns(centre, axes * (size * growth), flows, start, decay)
+                if isinstance(found, Tail):
+                    return found
+                reason = found.reason
+        return TailFailure(reason)
+
+    def _disturbed_size(self, inverse: Floats, slope: Floats, centre: Floats) -> Floats:
+        """Float estimate of the ultimate bound under the disturbance, in the frame's coordinates."""
+        n, nw = self.fld.states, self.fld.disturbances
+        B = self._slope(self._inputs(centre))[n * n : n * (n + nw), 0].reshape(n, nw)[self.states]
+        push = np.abs(inverse @ B) @ self.w_radius
+        values = np.linalg.eigvals(slope)
+        return np.asarray(1.3 * push / max(1e-9, -values.real.max()))
+
+    def _nothing_moves(self, flows: Sequence[Flow], start: float) -> Tail:
+        """No state matters to a constraint: they hold for ever as they hold at one instant."""
+        last = len(flows[0].fields) - 1
+        upper = np.max([f.faces_at(f.time, *f.set_at(len(f.steps)), last) for f in flows], axis=0)
+        unbounded = np.full(self.fld.states, np.inf)
+        return Tail(start, upper, np.full(self.fld.outputs, np.inf), -unbounded, unbounded)
+
+    def _returns(
+        self, centre: Floats, axes: Floats, flows: Sequence[Flow], start: float, decay: float
+    ) -> Tail | TailFailure:
+        """Flow B = centre + axes [-1, 1]^k until it is inside itself; check that B holds the flows."""
+        keep = self.states
+        k = len(keep)
+        M = axes[keep]
+        try:
+            N = np.linalg.inv(M)
+        except np.linalg.LinAlgError:
+            return TailFailure("the invariant set is flat")
+        # |M^-1 y|_inf <= |N y|_inf / (1 - |N M - I|_inf).
+        miss = np.abs(N @ M - np.eye(k)) + 2.0 * k * UNIT * (np.abs(N) @ np.abs(M))
+        off = float(miss.sum(axis=1).max()) * (1.0 + 8.0 * k * UNIT)
+        if not off < 0.01:
+            return TailFailure("the modes of the loop are nearly parallel")
+        room = (1.0 - off) * (1.0 - 4.0 * UNIT)
+        if not all(self._inside(f, N, centre, room) for f in flows):
+            return TailFailure("the reach set is not inside the candidate set")
+        chart = replace(self.chart, centre=centre, axes=axes, round=False, faces=None)
+        d = int((chart.unknown_lo < chart.unknown_hi).sum())
+        piece = Piece(chart, -np.ones(k + d), np.ones(k + d))
+        last = replace(self.fld, start=0.0)
+        flow = Flow([last], piece, self.w_centre, self.w_radius, self.order, names=self.names)
+        span = 25.0 / decay
+        while flow.time < span and len(flow.steps) < 400:
+            if not flow.advance(span):
+                return TailFailure(f"the flow of the candidate set stops {flow.failure}")
+            upper = flow.steps[-1].face_upper
+            if not (upper <= 0.0).all():
+                bad = self.fld.faces[int(np.argmax(~(upper <= 0.0)))]
+                return TailFailure(f"constraint '{bad}' cannot be proved on the candidate set")
+            if self._inside(flow, N, centre, room):
+                return self._tail(flow, start)
+        return TailFailure("the candidate set does not return into itself")
+
+    def _inside(self, flow: Flow, N: Floats, centre: Floats, room: float) -> bool:
+        keep = self.states
+        p, G = flow.set_at(len(flow.steps))
+        shifted = p[keep].copy()
+        shifted[:, 0] -= centre[keep]
+        size = np.abs(p[keep]).sum(axis=1) + np.abs(centre[keep]) + generator_box(G)[keep]
+        q = N @ shifted
+        spread = np.abs(np.einsum("fi,gin->fgn", N, G[:, keep])).sum(axis=(1, 2)) * (1.0 + 4.0 * (G.size + 4) * UNIT)
+        slack = 8.0 * (len(keep) + 4) * UNIT * (np.abs(N) @ size)
+        reach = np.maximum(flow.bounds.upper(q), flow.bounds.upper(-q)) + spread + slack
+        return bool((reach < room).all())
+
+    def _tail(self, flow: Flow, start: float) -> Tail:
+        lo, hi = flow.tubes()
+        faces = np.max([s.face_upper for s in flow.steps], axis=0)
+        tracking = np.max([s.tracking for s in flow.steps], axis=0)
+        if len(self.states) < self.fld.states:
+            tracking = np.full(self.fld.outputs, np.inf)
+        below, above = np.full(self.fld.states, -np.inf), np.full(self.fld.states, np.inf)
+        below[self.states] = lo.min(axis=0)[self.states]
+        above[self.states] = hi.max(axis=0)[self.states]
+        return Tail(start, faces, tracking, below, above)
