@@ -34,7 +34,7 @@ test: lint
 	$(PYTEST) -n 2 --dist worksteal -m "not campaign"
 
 soundness: .venv/.develop
-	$(PYTEST) -n 2 --dist worksteal -s -m campaign tests/soundness
+	$(PYTEST) -n 2 --dist worksteal -m campaign tests/soundness
 
 bench: .venv/.core
 	$(BIN)/python -m benchmarks

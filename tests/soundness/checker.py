@@ -123,10 +123,11 @@ def contradictions(loop: Loop, trajectory: Trajectory, claim: Claim, tolerance: 
         least = float(np.min(excess(claim.region, trajectory.y[inside][:, : loop.n])))
         return [violation("has not entered the target", latest, least)]
     found = []
-    if entry < earliest:
-        depth = -float(excess(claim.region, trajectory.at(entry)[: loop.n])[0])
-        if depth > tolerance:
-            found.append(violation("entered the target before the earliest time", entry, earliest - entry))
+    soon = trajectory.t < earliest
+    depth = -excess(claim.region, trajectory.y[soon][:, : loop.n]) if soon.any() else np.zeros(0)
+    if np.any(depth > tolerance):
+        first = float(trajectory.t[soon][int(np.argmax(depth > tolerance))])
+        found.append(violation("entered the target before the earliest time", first, earliest - first))
     for t, y, w in zip(trajectory.t, trajectory.y, trajectory.w, strict=True):
         if t > entry:
             break

@@ -35,24 +35,26 @@ def test_point_mass_quick(point_mass: list[Any]) -> None:
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("part", range(8))
-def test_arm_campaign(arm: list[Any], part: int) -> None:
+def test_arm_campaign(arm: list[Any], part: int, record_property: Any) -> None:
     """1,000 random starts of every certified switch of one mode."""
     source = arm[part]
     found = source.examine(runs=1000, seed=7)
-    print(
-        f"\ntwo_link_arm {source.mode.name}: 1000 starts x {len(source.claims)} switches, "
-        f"{len(found)} violations"
+    record_property(
+        "campaign",
+        f"two_link_arm {source.mode.name}: 1000 starts x {len(source.claims)} switches, "
+        f"{len(found)} violations",
     )
     assert not found
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("part", range(8))
-def test_point_mass_campaign(point_mass: list[Any], part: int) -> None:
+def test_point_mass_campaign(point_mass: list[Any], part: int, record_property: Any) -> None:
     source = point_mass[part]
     found = source.examine(runs=1000, seed=7)
-    print(
-        f"\npoint_mass {source.mode.name} at {source.p[0]}: 1000 starts x {len(source.claims)} switches, "
-        f"{len(found)} violations"
+    record_property(
+        "campaign",
+        f"point_mass {source.mode.name} at {source.p[0]}: 1000 starts x {len(source.claims)} switches, "
+        f"{len(found)} violations",
     )
     assert not found

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -13,6 +15,7 @@ from tests.soundness.population import HORIZON, Case, case
 
 QUICK = (0, 1, 3, 4, 9, 15)
 SYSTEMS = 60
+BUDGET = 15.0  # seconds of work for one system; what is not decided then counts as undecided
 
 
 @dataclass
@@ -28,7 +31,7 @@ class Outcome:
 def judge(seed: int, runs: int) -> Outcome:
     made = case(seed)
     outcome = Outcome(made)
-    graph = mg.build([made.mode, *made.targets], horizon=HORIZON)
+    graph = mg.build([made.mode, *made.targets], horizon=HORIZON, budget=BUDGET)
     verdicts = {goal.name: (goal.set, graph.verdict(made.mode.name, goal.name)) for goal in made.targets}
     outcome.violations += [str(v) for v in examine(made.mode, claims(verdicts), runs=runs, seed=seed)]
     for goal in made.questions:
@@ -58,27 +61,32 @@ def test_population_has_the_promised_mix() -> None:
     assert {c.mode.start.dim for c in cases} == {1, 2, 3, 4}
 
 
-@pytest.mark.campaign
-def test_campaign() -> None:
-    outcomes = [judge(seed, runs=210) for seed in range(SYSTEMS)]
-    print("\nkind                   systems  certified  refuted  undecided  violations")
-    kinds = {
+def summary(outcomes: list[Outcome]) -> str:
+    """A table of answers by kind of system, then the reasons of what stayed undecided."""
+    kinds: dict[str, Callable[[Case], bool]] = {
         "linear": lambda c: not c.nonlinear,
         "nonlinear": lambda c: c.nonlinear,
         "disturbed": lambda c: c.disturbed,
         "through a matrix": lambda c: c.matrix,
         "all": lambda c: True,
     }
+    lines = ["kind                   systems  certified  refuted  undecided  violations"]
     for kind, belongs in kinds.items():
         chosen = [o for o in outcomes if belongs(o.case)]
         count = sum((o.answers for o in chosen), Counter())
-        print(
+        lines.append(
             f"{kind:22s} {len(chosen):7d} {count['certified']:10d} {count['refuted']:8d} "
             f"{count['undecided']:10d} {sum(len(o.violations) for o in chosen):11d}"
         )
     for outcome in outcomes:
-        for reason in outcome.reasons:
-            print(f"  undecided: {outcome.case.mode.name} -> {reason}")
+        lines += [f"  undecided: {outcome.case.mode.name} -> {reason}" for reason in outcome.reasons]
+    return "\n".join(lines)
+
+
+@pytest.mark.campaign
+def test_campaign(record_property: Any) -> None:
+    outcomes = [judge(seed, runs=210) for seed in range(SYSTEMS)]
+    record_property("campaign", summary(outcomes))
     violations = [text for o in outcomes for text in o.violations]
     assert not violations, "\n".join(violations)
     total = sum((o.answers for o in outcomes), Counter())

@@ -16,6 +16,9 @@ import numpy as np
 import modegraph as mg
 from tests.soundness.checker import claims, examine, refutation_holds
 
+BUDGET = 15.0
+"""Seconds of work for one question; a trap is small."""
+
 
 def flow(
     name: str, dynamics: Callable[..., Any], start: Any, *, states: Any = None, **options: Any
@@ -33,7 +36,7 @@ def goal(lo: Any, hi: Any) -> mg.Target:
 
 
 def ask(source: mg.Mode, target: Any, horizon: float, r_i: Any = None, r_j: Any = None) -> mg.Verdict:
-    graph = mg.build([source, target], horizon=horizon)
+    graph = mg.build([source, target], horizon=horizon, budget=BUDGET)
     return graph.verdict(source.name, target.name, r_i, r_j)
 
 

@@ -95,14 +95,14 @@ class Reach:
             sets.append(grown)
         return np.stack(joint), sets
 
-    def earliest(self, region: Region, plant: int) -> float:
-        """No trajectory is in the target before this instant (seconds)."""
+    def earliest(self, region: Region, plant: int) -> float | None:
+        """First instant (seconds) at which a trajectory may be in the target; None: at no time of the flow."""
         if not self.flow.steps:
-            return 0.0
+            return float(self.times[0])
         lo, hi = self.flow.tubes()
         apart = region_separated(region, lo[:, :plant], hi[:, :plant])
         touching = np.flatnonzero(~apart)
-        return float(self.times[touching[0]]) if len(touching) else float(self.times[-1])
+        return float(self.times[touching[0]]) if len(touching) else None
 
 
 def region_separated(region: Region, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
@@ -119,7 +119,7 @@ def proved_instants(flow: Flow) -> int:
     """
     if flow.failure is not None and not flow.steps:
         return -1
-    if not (flow.faces_at(flow.times[0], flow.p0, flow.G0, 0) <= 0.0).all():
+    if not (flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment) <= 0.0).all():
         return -1
     for k, step in enumerate(flow.steps):
         if not (step.face_upper <= 0.0).all():

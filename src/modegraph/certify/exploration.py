@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..expression.evaluate import Evaluator
 from ..expression.tape import Tape
 from ..reach.field import Field
-from ..reach.flow import Flow, Order
+from ..reach.flow import RESTART_STEPS, Flow, Order
+from ..reach.restart import restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, sample_powers, widest_variable
@@ -21,8 +22,14 @@ from .region import Region
 
 Floats = NDArray[np.float64]
 
+LADDER = ((4, 3), (5, 4))
+"""Degrees of p and of the Jacobian flow: first try, and second try where the first breaks down."""
+MOST_MONOMIALS = 1300
+MOST_GENERATOR_MONOMIALS = 100
 MOST_PARTS = 48
 DEEPEST_CUT = 7
+SETTLING = 4.0
+"""Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 LONGEST = 1000.0
 """Seconds of flow after which a mode without horizon and without a tail is given up."""
 
@@ -49,6 +56,7 @@ class Findings:
     broken: bool = False
     """A sampled start really breaks a constraint: smaller parts cannot help."""
     flow: Flow | None = None
+    last: Flow | None = None
 
 
 class Exploration:
@@ -82,10 +90,12 @@ class Exploration:
         m = piece.variables
         if self.linear or m == 0:
             return Order(1, 0)
-        degree = 4 + effort
-        while degree > 3 and _count(m, degree) > 1300:
+        degree, jacobian = LADDER[effort]
+        while degree > 3 and _count(m, degree) > MOST_MONOMIALS:
             degree -= 1
-        return Order(degree, min(2, degree - 1))
+        while jacobian > 1 and _count(m, jacobian) > MOST_GENERATOR_MONOMIALS:
+            jacobian -= 1
+        return Order(degree, min(jacobian, degree - 1))
 
     # -- one part --------------------------------------------------------------------------------
 
@@ -98,15 +108,22 @@ class Exploration:
         done = not again and not check_again
         if done or time.monotonic() > self.deadline or self.parts >= MOST_PARTS:
             return found
-        if found.failure and effort == 0 and not self.linear and _count(piece.variables, 6) <= 400:
-            better = self.explore(piece, again, check_again, effort=2)
+        cut_short = bool(found.failure or found.unproved)
+        if cut_short and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
+            better = self.explore(piece, again, check_again, effort + 1)
             return _merge(found, [better], again, check_again)
         if piece.depth >= DEEPEST_CUT or piece.variables == 0:
             return found
         flow = found.flow
         assert flow is not None
-        variable = nonlinear_variable(flow) if found.failure else widest_variable(flow.bounds, flow.set_at(0)[0])
-        children = [self.explore(child, again, check_again, effort) for child in piece.split(variable)]
+        variable = nonlinear_variable(flow) if cut_short else widest_variable(flow.bounds, flow.set_at(0)[0])
+        children: list[Findings] = []
+        for child in piece.split(variable):
+            part = self.explore(child, again, check_again, effort)
+            children.append(part)
+            if not _better(part, found, again, check_again):
+                # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
+                return found
         return _merge(found, children, again, check_again)
 
     def _worth_refining(self, found: Findings, left: Sequence[int], safety: bool) -> tuple[list[int], bool]:
@@ -116,14 +133,16 @@ class Exploration:
             return sorted(hopeful), False
         cut_short = bool(found.failure or found.unproved)
         if cut_short:
-            hopeful |= {j for j in left if found.missed[j].gauge < 3.0}
+            hopeful |= set(left)
         return sorted(hopeful), safety and found.safety is None and cut_short
 
     def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int) -> Findings:
+        order = self.order(piece, effort)
         flow = Flow(
-            self.fields, piece, self.w_centre, self.w_radius, self.order(piece, effort),
+            self.fields, piece, self.w_centre, self.w_radius, order,
             names=self.names, reset=self.reset, stops=self.stops,
         )  # fmt: skip
+        flows = [flow]
         last = self.fields[-1]
         search = TailSearch(last, piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order(piece))
         end = LONGEST if self.horizon is None else self.horizon
@@ -132,15 +151,24 @@ class Exploration:
         previous = {j: np.inf for j in wanted}
         pending = list(wanted)
         checkpoint = 8
+        taken = 0
         while flow.time < end and time.monotonic() < self.deadline:
             if not flow.advance(end):
                 break
             if not (flow.steps[-1].face_upper <= 0.0).all():
                 # Nothing later can be used for a switch; the check has failed on this part.
                 break
-            if len(flow.steps) < checkpoint and flow.time < end:
+            taken += 1
+            if not self.linear and flow.wants_restart():
+                following = restarted(flow, order)
+                if following is not None and flow.time < end and following.advance(end):
+                    flow = following
+                    flows.append(flow)
+                else:
+                    flow.next_restart = len(flow.steps) + RESTART_STEPS
+            if taken < checkpoint and flow.time < end:
                 continue
-            checkpoint = int(len(flow.steps) * 1.25) + 4
+            checkpoint = int(taken * 1.25) + 4
             self.tick(f"t = {flow.time:.3g} s")
             if tail is None and flow.time >= last.start:
                 outcome = search.attempt([flow])
@@ -152,10 +180,11 @@ class Exploration:
             pending = [j for j in pending if not now[j] <= 1.0]
             if not pending and (tail is not None or not safety):
                 break
-            if tail is not None and all(now[j] > 0.98 * previous[j] for j in pending):
+            settled = tail is not None and flow.time > tail.start + SETTLING / tail.decay
+            if settled and all(now[j] > 0.98 * previous[j] for j in pending):
                 break
             previous = {j: now[j] for j in pending}
-        return self._findings(flow, wanted, tail, tail_reason, safety, end)
+        return self._findings(flows, wanted, tail, tail_reason, safety)
 
     def _tail_order(self, piece: Piece) -> Order:
         return Order(1, 0) if self.linear else Order(3, 2)
@@ -169,50 +198,71 @@ class Exploration:
         return float(goal.region.gauges(flow.bounds, p[None, :n], [G[:, :n]])[0])
 
     def _findings(
-        self, flow: Flow, wanted: Sequence[int], tail: Tail | None, tail_reason: str, safety: bool, end: float
+        self, flows: Sequence[Flow], wanted: Sequence[int], tail: Tail | None, tail_reason: str, safety: bool
     ) -> Findings:
-        found = Findings(flow=flow, tail_reason=tail_reason)
+        """What a chain of flows shows; each but the first starts around the end of the one before."""
+        flow = flows[-1]
+        found = Findings(flow=flows[0], last=flow, tail_reason=tail_reason)
         proved = proved_instants(flow)
-        times = flow.times
         if flow.failure is not None:
             found.failure = str(flow.failure)
         if proved < len(flow.steps):
             found.unproved = self._unproved(flow, proved)
-            found.broken = sampled_violation(flow)
-        found.safe_until = float(times[proved]) if proved >= 0 else 0.0
+            found.broken = len(flows) == 1 and sampled_violation(flow)
+        found.safe_until = float(flow.times[proved]) if proved >= 0 else float(flow.times[0])
         for j in wanted:
-            goal = self.goals[j]
-            reach = Reach(flow, self.horizon, goal.reset)
-            outcome = find_crossings(reach, goal.region)
+            outcome = self._crossing(flows, j)
             if isinstance(outcome, Missed):
                 found.missed[j] = outcome
-                continue
-            latest = max(c.instant for c in outcome)
-            found.proofs[j] = SwitchProof(
-                earliest=min(reach.earliest(goal.region, self.plant), min(c.time for c in outcome)),
-                latest=max(c.time for c in outcome),
-                margin=min(1.0 - c.best for c in outcome),
-                window=min(c.window for c in outcome),
-                energy=max(c.energy for c in outcome),
-                slack=slack_until(flow, latest),
-                parts=len(outcome),
-            )
+            else:
+                found.proofs[j] = outcome
         if safety and proved == len(flow.steps) and flow.failure is None:
-            found.safety = self._safety(flow, tail)
+            found.safety = self._safety(flows, tail)
         return found
 
-    def _safety(self, flow: Flow, tail: Tail | None) -> SafetyProof | None:
-        if tail is None:
-            if self.linear and not flow.fields[-1].faces and flow.time >= flow.fields[-1].start:
-                # A linear loop has a solution for all time, and there is nothing else to prove.
-                return SafetyProof({}, flow.time, np.full(flow.fields[-1].outputs, np.inf))
-            return None
+    def _crossing(self, flows: Sequence[Flow], j: int) -> SwitchProof | Missed:
+        goal = self.goals[j]
+        best: Missed | None = None
+        slack: list[dict[str, float]] = []
+        earliest: float | None = None
+        for flow in flows:
+            reach = Reach(flow, self.horizon, goal.reset)
+            if earliest is None:
+                earliest = reach.earliest(goal.region, self.plant)
+            outcome = find_crossings(reach, goal.region)
+            if not isinstance(outcome, Missed):
+                first = min(c.time for c in outcome)
+                latest = max(c.instant for c in outcome)
+                return SwitchProof(
+                    earliest=first if earliest is None else min(earliest, first),
+                    latest=max(c.time for c in outcome),
+                    margin=min(1.0 - c.best for c in outcome),
+                    window=min(c.window for c in outcome),
+                    energy=max(c.energy for c in outcome),
+                    slack=least_slack([*slack, slack_until(flow, latest)]),
+                    parts=len(outcome),
+                )
+            if best is None or outcome.gauge < best.gauge:
+                best = outcome if flow is flows[0] else replace(outcome, start=flows[0].piece.middle)
+            if proved_instants(flow) < len(flow.steps):
+                break
+            slack.append(slack_until(flow, len(flow.steps)))
+        assert best is not None
+        return best
+
+    def _safety(self, flows: Sequence[Flow], tail: Tail | None) -> SafetyProof | None:
+        flow = flows[-1]
         last = flow.fields[-1]
-        after = {}
+        if tail is None:
+            if self.linear and not last.faces and flow.time >= last.start:
+                # A linear loop has a solution for all time, and there is nothing else to prove.
+                return SafetyProof({}, flow.time, np.full(last.outputs, np.inf))
+            return None
+        after: dict[str, float] = {}
         for name, upper in zip(last.faces, tail.face_upper, strict=True):
             after[name] = min(-float(upper), after.get(name, np.inf))
-        tracking = np.max([tail.tracking, *(s.tracking for s in flow.steps)], axis=0)
-        slack = least_slack([slack_until(flow, len(flow.steps)), after])
+        tracking = np.max([tail.tracking, *(s.tracking for f in flows for s in f.steps)], axis=0)
+        slack = least_slack([*(slack_until(f, len(f.steps)) for f in flows), after])
         return SafetyProof(slack, tail.start, tracking)
 
     def _unproved(self, flow: Flow, proved: int) -> str:
@@ -231,6 +281,14 @@ class Exploration:
         return f"constraint '{names[k]}' cannot be proved {when} ({by})"
 
 
+def _better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:
+    """Whether a part of the starts got further than the whole did."""
+    if any(j in part.proofs for j in wanted) or (safety and part.safety is not None):
+        return True
+    closer = any(part.missed[j].gauge < 0.9 * whole.missed[j].gauge for j in wanted if j in part.missed)
+    return closer or part.safe_until > 1.1 * whole.safe_until
+
+
 def _count(m: int, degree: int) -> int:
     count = 1
     for k in range(1, degree + 1):
@@ -241,8 +299,8 @@ def _count(m: int, degree: int) -> int:
 def slack_until(flow: Flow, instant: int) -> dict[str, float]:
     """Proved slack of every constraint on [0, times[instant]]."""
     many: list[dict[str, float]] = []
-    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, 0)
-    many.append(_by_name(flow.fields[0].faces, upper))
+    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+    many.append(_by_name(flow.fields[flow.first_segment].faces, upper))
     for step in flow.steps[:instant]:
         many.append(_by_name(flow.fields[step.segment].faces, step.face_upper))
     return least_slack(many)

@@ -175,6 +175,8 @@ class _Unit:
             tick=self.tick,
         )
         self._switches_in_zero_time()
+        scene = self._scene()
+        self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])
         wanted = [k for k in self.goals if k not in self.verdicts]
         found = exploration.explore(compiled.whole(), wanted, safety=True)
         for k in wanted:
@@ -182,7 +184,7 @@ class _Unit:
                 self.verdicts[k] = certified_switch(found.proofs[k], self.horizon)
         if found.safety is not None:
             self.check = certified_check(found.safety)
-        self._refute(found)
+        self._refute(scene, found)
         for k in wanted:
             if k not in self.verdicts:
                 self.verdicts[k] = self._undecided(found, k)
@@ -230,23 +232,23 @@ class _Unit:
             stops=compiled.stops,
         )
 
-    def _refute(self, found: Findings) -> None:
-        """Try to refute what is left: equilibria first (one serves all targets), then trajectories."""
+    def _trap_all(self, scene: Scene, left: list[int]) -> None:
+        """Equilibria under constant disturbances: one serves all targets, and it costs almost nothing."""
+        if len(scene.fields) != 1 or scene.reset is not None:
+            return
+        d = scene.constants()
+        guess = np.asarray(scene.start.center, float)
+        for w in scene.disturbances():
+            if not left:
+                return
+            left = self._trap(scene, enclose_equilibrium(scene, guess, w, d), left)
+
+    def _refute(self, scene: Scene, found: Findings) -> None:
+        """Try to refute what is left by validated trajectories."""
         left = [k for k in self.goals if k not in self.verdicts]
         if not left and self.check is not None:
             return
-        scene = self._scene()
         d = scene.constants()
-        flow = found.flow
-        assert flow is not None
-        if left and len(scene.fields) == 1 and scene.reset is None:
-            guess = flow.set_at(len(flow.steps))[0][:, 0]
-            for w in scene.disturbances():
-                left = self._trap(scene, enclose_equilibrium(scene, guess, w, d), left)
-                if not left:
-                    break
-        if not left and self.check is not None:
-            return
         starts = candidate_starts(scene, self._hints(found, left))
         for w in scene.disturbances():
             for x0 in starts[:4]:

@@ -33,6 +33,9 @@ JACOBIAN_UNDEFINED = 2
 NO_GROWTH_BOUND = 3
 NO_CONTRACTION = 4
 
+MAIN_GENERATORS = 40
+"""Generators whose signs are followed through the quadratic terms."""
+
 SIGMA_2 = 0.1284
 """int_0^1 |s^2/2 - 1/6| ds = 2 / (9 sqrt(3)) = 0.12830..., rounded up."""
 
@@ -135,13 +138,14 @@ any other owner v means that the monomial holds the error variable of state v.""
 
 
 @njit(**KERNEL)
-def split_output(Q, o, KJ, q, embed, owner, start, J, dJ, nJ, swing):
+def split_output(Q, o, KJ, q, embed, owner, errors, start, J, dJ, nJ, swing, hessian):
     """Split an output of the Jacobian tape: its polynomial J (KJ+1, Nq) in the set variables with
-    degrees dJ and norms nJ, and how far it swings with each error variable, swing (n,).
-
-    Returns the norm of what was dropped.
+    degrees dJ and norms nJ, and how far it swings with each error variable, swing (n,), of which
+    hessian (n,) is the constant coefficient with its sign. Returns the norm of what was dropped.
     """
     swing[:] = 0.0
+    for v in range(swing.size):
+        hessian[v] = Q[o, 0, errors[v]]
     dropped = 0.0
     for i in range(KJ + 1):
         for k in range(owner.size):
@@ -161,6 +165,94 @@ def split_output(Q, o, KJ, q, embed, owner, start, J, dJ, nJ, swing):
     for v in range(swing.size):
         swing[v] *= UP
     return dropped * UP
+
+
+@njit(**KERNEL)
+def quadratic_bound(H, G0, G1, spread):
+    """Bounds (n,) of |e' H_i e| / 2 for e = (1 - s) g0 + s g1 + b, any s in [0, 1], |b| <= spread, where
+    g0 = sum_a G0_a zeta_a, g1 = sum_a G1_a zeta_a with the same |zeta_a| <= 1; H (n, n, n), G (K, n).
+
+    The weights (1 - s)^2, 2 s (1 - s), s^2 of the three products sum to one. The signs in the
+    generators count: along a slow mode what multiplies nearly cancels, in the box around it does not.
+    """
+    n = spread.size
+    count = G0.shape[0] + n
+    a0 = np.zeros((count, n))
+    a1 = np.zeros((count, n))
+    a0[: count - n] = G0
+    a1[: count - n] = G1
+    for v in range(n):
+        a0[count - n + v, v] = spread[v]
+        a1[count - n + v, v] = spread[v]
+    total = np.zeros(n)
+    for a in range(count):
+        for k in range(n):
+            total[k] += max(abs(a0[a, k]), abs(a1[a, k]))
+    out = np.zeros(n)
+    h0 = np.zeros(n)
+    h1 = np.zeros(n)
+    for i in range(n):
+        s00 = 0.0
+        s01 = 0.0
+        s11 = 0.0
+        size = 0.0
+        for b in range(count):
+            for k in range(n):
+                h0[k] = 0.0
+                h1[k] = 0.0
+                for l in range(n):
+                    h0[k] += H[i, k, l] * a0[b, l]
+                    h1[k] += H[i, k, l] * a1[b, l]
+                    size += abs(H[i, k, l]) * max(abs(a0[b, l]), abs(a1[b, l])) * total[k]
+            for a in range(count):
+                x00 = 0.0
+                x01 = 0.0
+                x10 = 0.0
+                x11 = 0.0
+                for k in range(n):
+                    x00 += a0[a, k] * h0[k]
+                    x01 += a0[a, k] * h1[k]
+                    x10 += a1[a, k] * h0[k]
+                    x11 += a1[a, k] * h1[k]
+                s00 += abs(x00)
+                s01 += 0.5 * (abs(x01) + abs(x10))
+                s11 += abs(x11)
+        out[i] = (0.5 * max(s00, max(s01, s11)) + 1.01 * (2 * n + 4) * UNIT * size) * UP + TINY
+    return out
+
+
+@njit(**KERNEL)
+def main_generators(G0, G1, most, spread):
+    """Constant coefficients of the ``most`` largest generators at both ends, (K, n) each; what is left
+    out, and everything that depends on the set variables, is added to ``spread`` (n,)."""
+    count, n, Nq = G0.shape
+    scale = np.zeros(n)
+    for a in range(count):
+        for i in range(n):
+            scale[i] += abs(G0[a, i, 0])
+    size = np.zeros(count)
+    for a in range(count):
+        for i in range(n):
+            size[a] -= abs(G0[a, i, 0]) / (scale[i] + TINY)
+    ranked = np.argsort(size)
+    kept = min(most, count)
+    out0 = np.zeros((kept, n))
+    out1 = np.zeros((kept, n))
+    for r in range(count):
+        a = ranked[r]
+        for i in range(n):
+            s0 = 0.0
+            s1 = 0.0
+            for k in range(0 if r >= kept else 1, Nq):
+                s0 += abs(G0[a, i, k])
+                s1 += abs(G1[a, i, k])
+            spread[i] += max(s0, s1) * UP
+            if r < kept:
+                out0[r, i] = G0[a, i, 0]
+                out1[r, i] = G1[a, i, 0]
+    for i in range(n):
+        spread[i] *= UP
+    return out0, out1
 
 
 @njit(**KERNEL)
@@ -203,7 +295,7 @@ def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
 def flow_step(
     ops, const, const_rad, outputs, variables,
     jops, jconst, jconst_rad, joutputs, jvariables,
-    states, p, G, radius, full_w, first_w, time_index, h, K, cut, KJ, q, KP, pairs, most, ebox0,
+    states, p, G, radius, full_w, first_w, time_index, h, K, cut, KJ, q, KP, pairs, most, ebox0, ybox0,
     P, dg, norms, R, kinks, ranges, Q, dq, nQ, RQ, jkinks, jranges,
     product, offset, start, degree,
     jproduct, joffset, jstart, jdegree, jpairs, jcut, embed, owner, errors,
@@ -216,11 +308,13 @@ def flow_step(
 
     ``radius`` (nw,) half-widths of the disturbance around the centre held in p; ``full_w``: df/dx and
     df/dw depend on w, evaluate them for all w; ``first_w``: index of variable w[0]. G (ng, n, Nq), at
-    most ``most`` of them.
+    most ``most`` of them: others are merged.
 
-    Returns (status, node, p_end (n, N), G_end, tube (n,), bend (n,), defect, control (4,)) where
-    tube bounds e over the whole step, bend the distance of p(s) from the chord p(0)..p(1), and
-    control = (time defect, other defect, spectral radius of h M, of h A0) for the step control.
+    Returns (status, node, p_end (n, N), G_end, tube (n,), bend (n,), rest (n,), control (5,)) where
+    tube bounds e over the whole step, bend the distance of p(s) from the chord p(0)..p(1), rest what
+    neither Psi e(0) nor the disturbance's columns carry (ybox0, ebox0: guesses of rest and tube), and
+    control = (time defect, other defect, spectral radius of h M, of h A0, share of e in what feeds e)
+    for the step control.
     """
     n = states
     Nq = G.shape[2]
@@ -228,7 +322,7 @@ def flow_step(
     nw = radius.size
     nothing_p = np.zeros((n, N))
     nothing = np.zeros(n)
-    control = np.zeros(4)
+    control = np.zeros(5)
     control[0] = np.inf
     defect, in_time, bad = taylor_step(
         ops, const, const_rad, outputs, variables, n, p, time_index, h, K, cut, pairs,
@@ -251,6 +345,11 @@ def flow_step(
     RJ = np.zeros(n * n)
     fixed = np.zeros(n * n)
     swing = np.zeros((n * n, n))
+    hessian = np.zeros((n * n, n))
+    hess = np.zeros((n, n, n))
+    H_end = G
+    dropped = nothing
+    ybox = np.maximum(1.3 * ybox0, 3.0 * defect) + TINY
     ebox = np.maximum(1.2 * ebox0, 1.2 * (z + 2.0 * defect)) + TINY
     need = ebox
     g = nothing
@@ -261,7 +360,7 @@ def flow_step(
     size_y = 0.0
     F = np.zeros((n, n, Nq))
     B = np.zeros((nw, n, Nq))
-    size_b = nothing
+    size_b = np.zeros(n)
     accepted = False
     for attempt in range(8):
         truncate_inputs(P, dg, norms, variables, Q, dq, jvariables, KJ, q, embed, start, lost)
@@ -288,7 +387,9 @@ def flow_step(
                 return JACOBIAN_UNDEFINED, bad, nothing_p, G, ebox, nothing, defect, control
         for r in range(n * n):
             o = joutputs[r]
-            fixed[r] = RQ[o] + split_output(Q, o, KJ, q, embed, owner, start, J[r], dJ[r], nJ[r], swing[r])
+            fixed[r] = RQ[o] + split_output(
+                Q, o, KJ, q, embed, owner, errors, start, J[r], dJ[r], nJ[r], swing[r], hessian[r]
+            )
             A0[r // n, r % n] = J[r, 0, 0]
         X = h * A0
         W, _ = exponential_majorant(X)
@@ -308,15 +409,41 @@ def flow_step(
                 for c in range(n):
                     u[r] += W_set[r, c] * h * size_b[c]
             u = u * UP
+        H_end, dropped = advance_generators(F, G, q, pairs, product, offset, start, degree)
+        for i in range(n):
+            for k in range(n):
+                for l in range(n):
+                    hess[i, k, l] = hessian[i * n + k, l] / ebox[l]
         shrink = np.ones(n)
         # Twice: once e is proved to stay within ``need``, the Jacobian swings only with that.
         for final in range(2):
-            # f(p + e) - f(p) = int_0^1 J(p + l e) dl e: powers of l e count by half at most.
-            for r in range(n * n):
-                s = 0.0
-                for v in range(n):
-                    s += swing[r, v] * shrink[v]
-                RJ[r] = (fixed[r] + 0.5 * s) * UP
+            # f(p + e) - f(p) = int_0^1 J(p + l e) dl e: powers of l e count by half at most. The main
+            # part of that, e' H e / 2 with a constant H, is bounded over the zonotope of e, and then
+            # acts as a push from outside; in a row where that gains nothing it stays in the Jacobian.
+            spread = dropped.copy()
+            for r in range(n):
+                s = u[r] + ybox[r]
+                for k in range(n):
+                    s += curve[r, k] * z[k]
+                spread[r] += s * UP
+            main0, main1 = main_generators(G, H_end, MAIN_GENERATORS, spread)
+            push = quadratic_bound(hess, main0, main1, spread)
+            for i in range(n):
+                whole = 0.0
+                for k in range(n):
+                    for v in range(n):
+                        whole += 0.5 * abs(hessian[i * n + k, v]) * shrink[v] * z[k]
+                keep_push = push[i] < whole
+                if not keep_push:
+                    push[i] = 0.0
+                for k in range(n):
+                    r = i * n + k
+                    s = 0.0
+                    for v in range(n):
+                        s += swing[r, v] * shrink[v]
+                        if keep_push:
+                            s -= abs(hessian[r, v]) * shrink[v] * (1.0 - 2.0 * (UP - 1.0))
+                    RJ[r] = (fixed[r] + 0.5 * max(0.0, s)) * UP + 4.0 * UNIT * abs(A0[i, k])
             E = fundamental_defect(nJ, RJ, sup, tails, n, h, KJ, KP, q, pairs)
             D = np.zeros((n, n))
             M = np.zeros((n, n))
@@ -334,7 +461,7 @@ def flow_step(
                         M[r, c] = (abs(A0[r, c]) + D[r, c]) * UP
             c_total = np.zeros(n)
             for r in range(n):
-                s = defect[r] + h * miss_b[r]
+                s = defect[r] + h * miss_b[r] + h * push[r]
                 for k in range(n):
                     # u follows J at s = 0; what moves later, or with e, acts on it from outside.
                     moved = RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k])
@@ -343,6 +470,13 @@ def flow_step(
                             moved += nJ[r * n + k, i, d]
                     s += E[r, k] * z[k] + h * moved * u[k]
                 c_total[r] = s * UP
+            control[4] = 0.0
+            for r in range(n):
+                s = 0.0
+                s += h * push[r]
+                for k in range(n):
+                    s += E[r, k] * z[k]
+                control[4] = max(control[4], s / (s + defect[r] + u[r] + TINY))
             Wc = np.zeros(n)
             for r in range(n):
                 for k in range(n):
@@ -370,7 +504,7 @@ def flow_step(
                     s += curve[r, k] * z[k]
                     end += last[r, k] * z[k]
                 need[r] = (max(z[r], end * UP) + s) * UP
-                if not need[r] < ebox[r]:
+                if not need[r] < ebox[r] or not g[r] < ybox[r]:
                     inside = False
             if final == 0:
                 accepted = inside
@@ -378,9 +512,11 @@ def flow_step(
                     break
                 for v in range(n):
                     shrink[v] = min(1.0, need[v] / ebox[v] * UP)
+                ybox = g
         if accepted:
             break
         ebox = np.maximum(ebox, 1.3 * need)
+        ybox = np.maximum(ybox, 1.5 * g)
     if not accepted:
         return NO_CONTRACTION, 0, nothing_p, G, ebox, nothing, defect, control
     # p(1): K + 1 terms summed, at most K roundings.
@@ -444,10 +580,9 @@ def flow_step(
                 for l in range(Nq):
                     first[j, i, l] = h * radius[j] * (B[j, i, l] + image[i, l] / 2.0 + again[i, l] / 6.0)
                     second[j, i, l] = h * radius[j] * image[i, l] / 4.0
-    H, dropped = advance_generators(F, G, q, pairs, product, offset, start, degree)
-    old = H.shape[0]
+    old = H_end.shape[0]
     grown = np.zeros((old + n + 2 * nw, n, Nq))
-    grown[:old] = H
+    grown[:old] = H_end
     for i in range(n):
         grown[old + i, i, 0] = (box[i] + dropped[i]) * UP + TINY
     for j in range(nw):
@@ -462,4 +597,4 @@ def flow_step(
         other = max(other, defect[i] - in_time[i])
     control[0] = time_error
     control[1] = other
-    return DONE, 0, p_end, grown, need, bend, defect, control
+    return DONE, 0, p_end, grown, need, bend, g, control

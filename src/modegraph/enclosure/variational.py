@@ -318,9 +318,9 @@ def reduce_generators(G, keep):
     """Merge generators into nearly parallel larger ones until ``keep`` are left, plus n axis generators.
 
     With b = c a + r: a zeta_a + b zeta_b lies in (1 + |c|) a zeta + r zeta_b for any c, exactly; r goes
-    into a box. Columns of neighbouring steps become parallel as they age, so little is lost, and no
-    sign is: boxes of whole generators would wrap. (The recipe merges into boxes: measured 1.6 times
-    wider after four seconds of a disturbed linear loop.)
+    into a box. Columns of neighbouring steps become parallel as they age, so r is small, and no sign
+    is lost. (Merging whole generators into boxes, as the recipe does, was 1.6 times wider after four
+    seconds of a disturbed linear loop; a box in the frame of the loop's modes gained nothing.)
     """
     count, n, Nq = G.shape
     scale = np.zeros(n)
@@ -344,11 +344,11 @@ def reduce_generators(G, keep):
             for i in range(n):
                 dot += v[a, i] * v[b, i]
             c = dot / length[a]
-            r = 0.0
+            miss = 0.0
             for i in range(n):
-                r += abs(v[b, i] - c * v[a, i])
-            if r < cost[b]:
-                cost[b] = r
+                miss += abs(v[b, i] - c * v[a, i])
+            if miss < cost[b]:
+                cost[b] = miss
                 partner[b] = a
     alive = np.ones(count, np.bool_)
     grow = np.ones(count)

@@ -42,8 +42,11 @@ RATE_CAP = 1.0
 """Largest spectral radius of h A0, A0 the Jacobian at the centre."""
 RUNAWAY_STEPS = 10
 """A remainder that doubles over this many steps while they cover little time is given up."""
-DISTURBED_RATE_CAP = 0.3
+DISTURBED_RATE_CAP = 0.2
 """The same with a disturbance: its two columns a step are exact only as h A0 -> 0."""
+RESTART_STEPS, RESTART_FEEDBACK, RESTART_SHARE = 12, 0.1, 0.5
+"""A disturbed flow is enclosed and started again after this many steps, when the remainder feeds
+itself by this share and is this large relative to the polynomial part."""
 SMALLEST_STEP = 1e-7
 """A flowpipe stops when its step falls below this part of the time scale of the loop."""
 
@@ -145,8 +148,8 @@ class Flow:
     piece : starts and unknowns.
     w_centre, w_radius : (q,) the disturbance set; for a fixed disturbance the radius is 0.
     order : degrees.
-    states, extra : (n, N) polynomials of the start and a box (n,) of what they miss, when they are
-        not the piece's own (memory reset to a function of the state).
+    reset : tape of the memory as a function of the plant state, where the piece is on the plant only.
+    t0, energy : seconds and a bound of int u'u at the start, for a flow that continues another.
     """
 
     def __init__(
@@ -161,6 +164,7 @@ class Flow:
         reset: Tape | None = None,
         stops: Sequence[float] = (),
         t0: float = 0.0,
+        energy: float = 0.0,
     ) -> None:
         self.fields = list(fields)
         self.piece = piece
@@ -176,6 +180,7 @@ class Flow:
         self.segment = 0
         while self.fields[self.segment].end <= t0:
             self.segment += 1
+        self.first_segment = self.segment
         self.stops = sorted(s for s in stops if s > t0)
         self.steps: list[Step] = []
         self.h = 0.0
@@ -201,8 +206,11 @@ class Flow:
         self.p0, self.G0 = p, G
         self._p, self._G = p, G
         self._ebox = np.zeros(n)
+        self._ybox = np.zeros(n)
         self._energy = np.zeros(self.small)
-        self._energy_radius = 0.0
+        self._energy_radius = energy
+        self.feedback = 0.0
+        self.next_restart = RESTART_STEPS
         self._sizes: list[float] = []
         self._longest = 0.0
 
@@ -282,7 +290,7 @@ class Flow:
             t1 = next_instant(self.time, h_try, stop)
             h = t1 - self.time
             outcome = self._attempt(fld, h)
-            status, node, p, G, tube, bend, defect, control = outcome
+            status, node, p, G, tube, bend, rest, control = outcome
             scale = TOLERANCE * (1.0 + np.abs(self._p[:, 0]).max())
             if status == DONE:
                 rate = control[0] / h
@@ -305,6 +313,8 @@ class Flow:
         else:
             self._fail(fld, NO_CONTRACTION, 0)
             return False
+        self.feedback = float(control[4])
+        self._ybox = rest
         self._record(fld, t1, p, G, tube, bend)
         if not np.isfinite(p).all() or self._runs_away(G):
             self._fail(fld, NO_CONTRACTION, 0)
@@ -343,7 +353,7 @@ class Flow:
             j.ops, j.const, j.const_rad, outputs, j.variables,
             n, inputs, self._G, moving, fld.full_w and len(moving) > 0, fld.first_w, fld.time_index,
             h, K, self._cut, KJ, self.q, FUNDAMENTAL_TIME_DEGREE,
-            self.table.pairs, most, self._ebox,
+            self.table.pairs, most, self._ebox, self._ybox,
             big["P"], big["dg"], big["norms"], big["R"], big["kinks"], big["ranges"],
             jac["P"], jac["dg"], jac["norms"], jac["R"], jac["kinks"], jac["ranges"],
             *self.table.arrays, *self._errors.table.arrays, self._errors.table.pairs,
@@ -431,6 +441,22 @@ class Flow:
             if not self.advance(limit):
                 return False
         return True
+
+    @property
+    def slope(self) -> Floats:
+        """Float Jacobian (n, n) at the centre of the last step."""
+        fld = self.fields[self.steps[-1].segment]
+        n = fld.states
+        space = self._spaces[(self.steps[-1].segment, "j")]
+        return np.asarray(space["P"][fld.jacobian.outputs[: n * n], 0, 0].reshape(n, n).copy())
+
+    def wants_restart(self) -> bool:
+        """Whether the remainder feeds itself and is as large as the polynomial part."""
+        if not self.w_radius.any() or len(self.steps) < self.next_restart or self.feedback < RESTART_FEEDBACK:
+            return False
+        z = generator_box(self._G)
+        own = np.abs(self._p[:, 1:]).sum(axis=1)
+        return bool((z > RESTART_SHARE * own).all())
 
     # -- what it says ----------------------------------------------------------------------------
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
 from ..expression.evaluate import Evaluator
 from .field import Field
-from .flow import Flow, Order, generator_box
+from .flow import Flow, Order
+from .parallelotope import half_widths, modal_axes
 from .start import Chart, Piece
 
 Floats = NDArray[np.float64]
@@ -32,6 +32,7 @@ class Tail:
 
     ``face_upper`` bounds each constraint face for all t >= start; ``tracking`` likewise |h(x) - r|.
     ``lo``, ``hi`` (n,): a box around everything after ``start`` (infinite in states nothing reads).
+    ``decay``: rate of the slowest mode at the equilibrium, 1/s (a float estimate).
     """
 
     start: float
@@ -39,6 +40,7 @@ class Tail:
     tracking: Floats
     lo: Floats
     hi: Floats
+    decay: float
 
 
 @dataclass(frozen=True)
@@ -104,25 +106,6 @@ class TailSearch:
                 break
         return x if np.isfinite(x).all() else None
 
-    def _frames(self, slope: Floats) -> list[Floats]:
-        """Candidate axes: modal (real and imaginary parts of eigenvectors), then the coordinates."""
-        k = len(slope)
-        frames = []
-        values, vectors = np.linalg.eig(slope)
-        columns = []
-        for i, value in enumerate(values):
-            if value.imag > 0.0:
-                columns += [vectors[:, i].real, vectors[:, i].imag]
-            elif value.imag == 0.0:
-                columns.append(vectors[:, i].real)
-        if len(columns) == k:
-            modal = np.array(columns).T
-            scale = np.linalg.norm(modal, axis=0)
-            if (scale > 0.0).all() and np.linalg.cond(modal / scale) < 1e4:
-                frames.append(modal / scale)
-        frames.append(np.eye(k))
-        return frames
-
     def attempt(self, flows: Sequence[Flow]) -> Tail | TailFailure:
         """Try from the present end of the flows (all the pieces of the starts)."""
         if not self.possible:
@@ -149,22 +132,18 @@ class TailSearch:
                 "the loop does not settle: its slowest mode has the rate "
                 f"{-decay:.3g} 1/s, so nothing can be said for all time"
             )
-        reason = ""
-        for frame in self._frames(slope):
-            axes = np.zeros((n, len(keep)))
-            axes[keep] = frame
-            widest = np.zeros(len(keep))
-            inverse = np.linalg.inv(frame)
-            for flow in flows:
-                p, G = flow.set_at(len(flow.steps))
-                q = inverse @ (p[keep] - np.where(np.arange(p.shape[1]) == 0, centre[keep][:, None], 0.0))
-                g = np.abs(np.einsum("fi,gin->fgn", inverse, G[:, keep])).sum(axis=(1, 2))
-                widest = np.maximum(widest, np.maximum(flow.bounds.upper(q), flow.bounds.upper(-q)) + g)
+        reason = "the modes of the loop are nearly parallel"
+        for frame in (modal_axes(slope), np.eye(len(keep))):
+            widest = np.max([half_widths(flow, frame, centre[keep], keep) for flow in flows], axis=0)
+            if not np.isfinite(widest).all():
+                continue
             size = np.maximum(widest * 1.02, FLOOR * widest.max())
             if self.w_radius.any():
-                size = np.maximum(size, self._disturbed_size(inverse, slope, centre))
+                size = np.maximum(size, self._disturbed_size(np.linalg.inv(frame), slope, centre))
             for growth in (1.0, 1.6):
-                found = self._returns(centre, axes * (size * growth), flows, start, decay)
+                axes = np.zeros((n, len(keep)))
+                axes[keep] = frame * (size * growth)
+                found = self._returns(centre, axes, flows, start, decay)
                 if isinstance(found, Tail):
                     return found
                 reason = found.reason
@@ -183,7 +162,7 @@ class TailSearch:
         last = len(flows[0].fields) - 1
         upper = np.max([f.faces_at(f.time, *f.set_at(len(f.steps)), last) for f in flows], axis=0)
         unbounded = np.full(self.fld.states, np.inf)
-        return Tail(start, upper, np.full(self.fld.outputs, np.inf), -unbounded, unbounded)
+        return Tail(start, upper, np.full(self.fld.outputs, np.inf), -unbounded, unbounded, np.inf)
 
     def _returns(
         self, centre: Floats, axes: Floats, flows: Sequence[Flow], start: float, decay: float
@@ -191,18 +170,8 @@ class TailSearch:
         """Flow B = centre + axes [-1, 1]^k until it is inside itself; check that B holds the flows."""
         keep = self.states
         k = len(keep)
-        M = axes[keep]
-        try:
-            N = np.linalg.inv(M)
-        except np.linalg.LinAlgError:
-            return TailFailure("the invariant set is flat")
-        # |M^-1 y|_inf <= |N y|_inf / (1 - |N M - I|_inf).
-        miss = np.abs(N @ M - np.eye(k)) + 2.0 * k * UNIT * (np.abs(N) @ np.abs(M))
-        off = float(miss.sum(axis=1).max()) * (1.0 + 8.0 * k * UNIT)
-        if not off < 0.01:
-            return TailFailure("the modes of the loop are nearly parallel")
-        room = (1.0 - off) * (1.0 - 4.0 * UNIT)
-        if not all(self._inside(f, N, centre, room) for f in flows):
+        inside = [self._inside(flow, axes, centre) for flow in flows]
+        if not all(inside):
             return TailFailure("the reach set is not inside the candidate set")
         chart = replace(self.chart, centre=centre, axes=axes, round=False, faces=None)
         d = int((chart.unknown_lo < chart.unknown_hi).sum())
@@ -217,23 +186,15 @@ class TailSearch:
             if not (upper <= 0.0).all():
                 bad = self.fld.faces[int(np.argmax(~(upper <= 0.0)))]
                 return TailFailure(f"constraint '{bad}' cannot be proved on the candidate set")
-            if self._inside(flow, N, centre, room):
-                return self._tail(flow, start)
+            if self._inside(flow, axes, centre):
+                return self._tail(flow, start, decay)
         return TailFailure("the candidate set does not return into itself")
 
-    def _inside(self, flow: Flow, N: Floats, centre: Floats, room: float) -> bool:
+    def _inside(self, flow: Flow, axes: Floats, centre: Floats) -> bool:
         keep = self.states
-        p, G = flow.set_at(len(flow.steps))
-        shifted = p[keep].copy()
-        shifted[:, 0] -= centre[keep]
-        size = np.abs(p[keep]).sum(axis=1) + np.abs(centre[keep]) + generator_box(G)[keep]
-        q = N @ shifted
-        spread = np.abs(np.einsum("fi,gin->fgn", N, G[:, keep])).sum(axis=(1, 2)) * (1.0 + 4.0 * (G.size + 4) * UNIT)
-        slack = 8.0 * (len(keep) + 4) * UNIT * (np.abs(N) @ size)
-        reach = np.maximum(flow.bounds.upper(q), flow.bounds.upper(-q)) + spread + slack
-        return bool((reach < room).all())
+        return bool((half_widths(flow, axes[keep], centre[keep], keep) < 1.0).all())
 
-    def _tail(self, flow: Flow, start: float) -> Tail:
+    def _tail(self, flow: Flow, start: float, decay: float) -> Tail:
         lo, hi = flow.tubes()
         faces = np.max([s.face_upper for s in flow.steps], axis=0)
         tracking = np.max([s.tracking for s in flow.steps], axis=0)
@@ -242,4 +203,4 @@ class TailSearch:
         below, above = np.full(self.fld.states, -np.inf), np.full(self.fld.states, np.inf)
         below[self.states] = lo.min(axis=0)[self.states]
         above[self.states] = hi.max(axis=0)[self.states]
-        return Tail(start, faces, tracking, below, above)
+        return Tail(start, faces, tracking, below, above, decay)
