@@ -143,6 +143,8 @@ def enclose_equilibrium(scene: Scene, guess: Floats, w: Floats, d: Floats) -> Eq
     for _ in range(20):
         f = rates(inputs(x)[:, None])[:, 0]
         J = slopes(inputs(x)[:, None])[: n * n, 0].reshape(n, n)
+        if not (np.isfinite(f).all() and np.isfinite(J).all()):
+            return None
         try:
             step = np.linalg.solve(J, -f)
         except np.linalg.LinAlgError:

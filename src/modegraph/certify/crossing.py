@@ -69,7 +69,7 @@ class Reach:
         A target on (x, z) of its own memory is met by (x, reset(x)).
         """
         if dim not in self._targets:
-            pairs = [self.flow.set_at(k) for k in range(self.usable + 1)]
+            pairs = [self.flow.state_set(k) for k in range(self.usable + 1)]
             p = np.stack([pair[0] for pair in pairs]) if pairs else np.zeros((0, dim, 1))
             G = [pair[1] for pair in pairs]
             plant = dim - (len(self.reset.outputs) if self.reset is not None else 0)
@@ -189,7 +189,7 @@ def _crossing(
         plain = region.gauges(bounds, p[instant:], [np.zeros((0, p.shape[1], 1))] * (end + 1 - instant))
         size = p.shape[1]
         steps = flow.steps[instant:end]
-        out = np.stack([(s.bend + s.tube)[:size] if len(s.tube) >= size else np.full(size, np.inf) for s in steps])
+        out = np.stack([flow.swell(s)[:size] if len(s.tube) >= size else np.full(size, np.inf) for s in steps])
         tube = np.maximum(plain[:-1], plain[1:]) + region.box_gauges(out)
         for step, gauge in zip(steps, tube, strict=True):
             if not gauge <= 1.0:
@@ -198,7 +198,7 @@ def _crossing(
     energy = 0.0
     if instant > 0:
         step = flow.steps[instant - 1]
-        energy = float(flow.small_bounds.upper(step.energy) + step.energy_radius)
+        energy = float(flow.seen_bounds.upper(step.energy) + step.energy_radius)
     best = float(gauges.min())
     return Crossing(instant, float(reach.times[instant]), float(gauges[instant]), best, window, energy)
 

@@ -13,6 +13,7 @@ from ..expression.evaluate import Evaluator
 from ..expression.tape import Tape
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
+from ..reach.parallelotope import mode_gap
 from ..reach.restart import restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
@@ -22,6 +23,7 @@ from .region import Region
 
 Floats = NDArray[np.float64]
 
+RESTART_ORDER = Order(4, 3)
 LADDER = ((4, 3), (5, 4))
 """Degrees of p and of the Jacobian flow: first try, and second try where the first breaks down."""
 MOST_MONOMIALS = 1300
@@ -30,6 +32,9 @@ MOST_PARTS = 48
 DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
+WIDE_GAP = 8.0
+LOOKS = 400
+"""Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
 """Seconds of flow after which a mode without horizon and without a tail is given up."""
 
@@ -57,6 +62,11 @@ class Findings:
     """A sampled start really breaks a constraint: smaller parts cannot help."""
     flow: Flow | None = None
     last: Flow | None = None
+    parked: list[Flow] = field(default_factory=list)
+    """Flows that wait for a common restart, because the disturbance has filled them."""
+    waiting: dict[int, list[SwitchProof]] = field(default_factory=dict)
+    """Goals that depend on the parked flows, with the proofs of the other parts."""
+    waiting_safety: list[SafetyProof] | None = None
 
 
 class Exploration:
@@ -65,6 +75,7 @@ class Exploration:
     def __init__(
         self,
         fields: Sequence[Field],
+        framed: Sequence[Field],
         goals: Sequence[Goal],
         *,
         plant: int,
@@ -76,7 +87,7 @@ class Exploration:
         deadline: float,
         tick: Callable[[str], None],
     ) -> None:
-        self.fields, self.goals, self.plant = fields, goals, plant
+        self.fields, self.framed, self.goals, self.plant = fields, framed, goals, plant
         self.w_centre, self.w_radius = w
         self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
         self.deadline, self.tick = deadline, tick
@@ -99,11 +110,61 @@ class Exploration:
 
     # -- one part --------------------------------------------------------------------------------
 
+    def decide(self, piece: Piece, wanted: Sequence[int]) -> Findings:
+        """Decide the wanted goals and the check for all starts."""
+        found = self.explore(piece, wanted, safety=True)
+        if found.parked:
+            # Parts of a loop that does not depend on time may go on together, from the latest of
+            # their instants: their trajectories are there earlier.
+            groups = [found.parked] if all(f.autonomous for f in self.fields) else [[f] for f in found.parked]
+            self._finish(found, [part for group in groups for part in self._groups(group, found)])
+        return found
+
+    def _groups(self, parked: list[Flow], found: Findings) -> list[Findings]:
+        """Parked flows together, or in halves where all of them are too much."""
+        part = self._together(parked, found)
+        decided = all(j in part.proofs for j in found.waiting) and (
+            found.waiting_safety is None or part.safety is not None
+        )
+        if decided or len(parked) == 1 or time.monotonic() > self.deadline:
+            return [part]
+        half = len(parked) // 2
+        return [*self._groups(parked[:half], found), *self._groups(parked[half:], found)]
+
+    def _together(self, parked: list[Flow], found: Findings) -> Findings:
+        """Restart parked flows as one, and again as often as it takes."""
+        end = self._end()
+        flows: list[Flow] = []
+        wanted = list(found.waiting)
+        safety = found.waiting_safety is not None
+        following = self._again(parked, end, first=True)
+        if following is None:
+            return Findings(flow=parked[0], last=parked[-1], failure="the reach set cannot be enclosed again")
+        flows.append(following)
+        tail, reason, _ = self._advance(flows, wanted, safety, end, park=False)
+        return self._findings(flows, wanted, tail, reason, safety, before=parked)
+
+    def _finish(self, found: Findings, parts: Sequence[Findings]) -> None:
+        for j, others in found.waiting.items():
+            proof = together([*others, *(part.proofs.get(j) for part in parts)])
+            if proof is not None:
+                found.proofs[j] = proof
+                found.missed.pop(j, None)
+            else:
+                missed = [part.missed[j] for part in parts if j in part.missed]
+                if missed:
+                    found.missed[j] = max(missed, key=lambda m: m.gauge)
+        if found.waiting_safety is not None:
+            found.safety = safe_together([*found.waiting_safety, *(part.safety for part in parts)])
+        for part in parts:
+            found.failure, found.unproved = part.failure, part.unproved
+            found.tail_reason, found.safe_until = part.tail_reason, max(found.safe_until, part.safe_until)
+
     def explore(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0) -> Findings:
         """Decide the wanted goals (and the check) on one part, cutting it where that helps."""
         self.parts += 1
         found = self._run(piece, wanted, safety, effort)
-        left = [j for j in wanted if j not in found.proofs]
+        left = [j for j in wanted if j not in found.proofs and j not in found.waiting]
         again, check_again = self._worth_refining(found, left, safety)
         done = not again and not check_again
         if done or time.monotonic() > self.deadline or self.parts >= MOST_PARTS:
@@ -140,18 +201,36 @@ class Exploration:
         order = self.order(piece, effort)
         flow = Flow(
             self.fields, piece, self.w_centre, self.w_radius, order,
-            names=self.names, reset=self.reset, stops=self.stops,
+            names=self.names, reset=self.reset, stops=self.stops, longest_step=self._longest_step(),
         )  # fmt: skip
-        flows = [flow]
-        last = self.fields[-1]
-        search = TailSearch(last, piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order(piece))
-        end = LONGEST if self.horizon is None else self.horizon
+        tail, reason, parked = self._advance([flow], wanted, safety, self._end(), park=True)
+        found = self._findings([flow], wanted, tail, reason, safety)
+        if parked and proved_instants(flow) == len(flow.steps):
+            found.parked = [flow]
+            found.waiting = {j: [] for j in wanted if j not in found.proofs}
+            if safety and found.safety is None:
+                found.waiting_safety = []
+        return found
+
+    def _end(self) -> float:
+        return LONGEST if self.horizon is None else self.horizon
+
+    def _advance(
+        self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool
+    ) -> tuple[Tail | None, str, bool]:
+        """Extend a chain of flows until everything is decided or nothing more can be expected.
+
+        Returns the tail, or why there is none, and whether the (first) flow wants to be restarted;
+        with ``park`` it stops there, else it restarts and goes on.
+        """
+        flow = flows[-1]
+        start = self.fields[-1].start
         tail: Tail | None = None
-        tail_reason = ""
+        reason = ""
         previous = {j: np.inf for j in wanted}
         pending = list(wanted)
         checkpoint = 8
-        taken = 0
+        taken = len(flow.steps)
         while flow.time < end and time.monotonic() < self.deadline:
             if not flow.advance(end):
                 break
@@ -160,47 +239,86 @@ class Exploration:
                 break
             taken += 1
             if not self.linear and flow.wants_restart():
-                following = restarted(flow, order)
-                if following is not None and flow.time < end and following.advance(end):
-                    flow = following
-                    flows.append(flow)
-                else:
-                    flow.next_restart = len(flow.steps) + RESTART_STEPS
+                if park:
+                    return tail, reason, True
+                flow = self._again([flow], end, flows=flows) or flow
             if taken < checkpoint and flow.time < end:
                 continue
             checkpoint = int(taken * 1.25) + 4
             self.tick(f"t = {flow.time:.3g} s")
-            if tail is None and flow.time >= last.start:
+            if tail is None and flow.time >= start:
+                search = TailSearch(
+                    flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
+                )
                 outcome = search.attempt([flow])
                 if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
                     tail = outcome
                 else:
-                    tail_reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
+                    reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
             now = {j: self._gauge_now(flow, j) for j in pending}
             pending = [j for j in pending if not now[j] <= 1.0]
             if not pending and (tail is not None or not safety):
                 break
             settled = tail is not None and flow.time > tail.start + SETTLING / tail.decay
             if settled and all(now[j] > 0.98 * previous[j] for j in pending):
-                break
+                if flow.frame is not None or self.framed[0].frame is None:
+                    break
+                if park:
+                    return tail, reason, True
+                following = self._again([flow], end, flows=flows)
+                if following is None:
+                    break
+                flow = following
             previous = {j: now[j] for j in pending}
-        return self._findings(flows, wanted, tail, tail_reason, safety)
+        return tail, reason, False
 
-    def _tail_order(self, piece: Piece) -> Order:
+    def _again(
+        self, last: Sequence[Flow], end: float, flows: list[Flow] | None = None, first: bool = False
+    ) -> Flow | None:
+        """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
+
+        The first holds out longer while the set is large, the second is tighter in the end, and at
+        once where fast and slow modes are far apart (measured on the arm: 5 against 16). None where
+        the restart breaks down at once.
+        """
+        flow = last[0]
+        framed = not first or mode_gap(flow.slope) > WIDE_GAP
+        following = restarted(last, self.framed if framed else self.fields, RESTART_ORDER)
+        if following is None or following.time >= end or not following.advance(end):
+            flow.next_restart = len(flow.steps) + RESTART_STEPS
+            return None
+        if flows is not None:
+            flows.append(following)
+        return following
+
+    def _longest_step(self) -> float:
+        """A crossing is looked for at the ends of steps only: enough of them within the horizon."""
+        return np.inf if self.horizon is None else self.horizon / (LOOKS if self.linear else LOOKS / 2)
+
+    def _tail_order(self) -> Order:
         return Order(1, 0) if self.linear else Order(3, 2)
 
     def _gauge_now(self, flow: Flow, j: int) -> float:
         goal = self.goals[j]
         if goal.reset is not None:
             return np.inf
-        p, G = flow.set_at(len(flow.steps))
+        p, G = flow.state_set(len(flow.steps))
         n = goal.region.dim
         return float(goal.region.gauges(flow.bounds, p[None, :n], [G[:, :n]])[0])
 
     def _findings(
-        self, flows: Sequence[Flow], wanted: Sequence[int], tail: Tail | None, tail_reason: str, safety: bool
+        self,
+        flows: Sequence[Flow],
+        wanted: Sequence[int],
+        tail: Tail | None,
+        tail_reason: str,
+        safety: bool,
+        before: Sequence[Flow] = (),
     ) -> Findings:
-        """What a chain of flows shows; each but the first starts around the end of the one before."""
+        """What a chain of flows shows; each but the first starts around the end of the one before.
+
+        The first starts around the ends of the flows ``before``, if there are any.
+        """
         flow = flows[-1]
         found = Findings(flow=flows[0], last=flow, tail_reason=tail_reason)
         proved = proved_instants(flow)
@@ -208,30 +326,34 @@ class Exploration:
             found.failure = str(flow.failure)
         if proved < len(flow.steps):
             found.unproved = self._unproved(flow, proved)
-            found.broken = len(flows) == 1 and sampled_violation(flow)
+            found.broken = len(flows) == 1 and not before and sampled_violation(flow)
         found.safe_until = float(flow.times[proved]) if proved >= 0 else float(flow.times[0])
         for j in wanted:
-            outcome = self._crossing(flows, j)
+            outcome = self._crossing(flows, j, before)
             if isinstance(outcome, Missed):
                 found.missed[j] = outcome
             else:
                 found.proofs[j] = outcome
         if safety and proved == len(flow.steps) and flow.failure is None:
-            found.safety = self._safety(flows, tail)
+            found.safety = self._safety(flows, tail, before)
         return found
 
-    def _crossing(self, flows: Sequence[Flow], j: int) -> SwitchProof | Missed:
+    def _crossing(self, flows: Sequence[Flow], j: int, before: Sequence[Flow] = ()) -> SwitchProof | Missed:
         goal = self.goals[j]
         best: Missed | None = None
-        slack: list[dict[str, float]] = []
-        earliest: float | None = None
+        slack = [slack_until(f, len(f.steps)) for f in before]
+        seen = [Reach(f, self.horizon, goal.reset).earliest(goal.region, self.plant) for f in before]
+        earliest = min((t for t in seen if t is not None), default=None)
+        # A part that was parked early is ahead of the clock of the common flow.
+        ahead = flows[0].times[0] - min((f.time for f in before), default=flows[0].times[0])
         for flow in flows:
             reach = Reach(flow, self.horizon, goal.reset)
             if earliest is None:
-                earliest = reach.earliest(goal.region, self.plant)
+                found = reach.earliest(goal.region, self.plant)
+                earliest = None if found is None else max(0.0, np.nextafter(found - ahead, -np.inf))
             outcome = find_crossings(reach, goal.region)
             if not isinstance(outcome, Missed):
-                first = min(c.time for c in outcome)
+                first = max(0.0, min(c.time for c in outcome) - ahead)
                 latest = max(c.instant for c in outcome)
                 return SwitchProof(
                     earliest=first if earliest is None else min(earliest, first),
@@ -243,14 +365,14 @@ class Exploration:
                     parts=len(outcome),
                 )
             if best is None or outcome.gauge < best.gauge:
-                best = outcome if flow is flows[0] else replace(outcome, start=flows[0].piece.middle)
+                best = outcome if flow is flows[0] and not before else replace(outcome, start=flows[0].piece.middle)
             if proved_instants(flow) < len(flow.steps):
                 break
             slack.append(slack_until(flow, len(flow.steps)))
         assert best is not None
         return best
 
-    def _safety(self, flows: Sequence[Flow], tail: Tail | None) -> SafetyProof | None:
+    def _safety(self, flows: Sequence[Flow], tail: Tail | None, before: Sequence[Flow] = ()) -> SafetyProof | None:
         flow = flows[-1]
         last = flow.fields[-1]
         if tail is None:
@@ -261,8 +383,9 @@ class Exploration:
         after: dict[str, float] = {}
         for name, upper in zip(last.faces, tail.face_upper, strict=True):
             after[name] = min(-float(upper), after.get(name, np.inf))
-        tracking = np.max([tail.tracking, *(s.tracking for f in flows for s in f.steps)], axis=0)
-        slack = least_slack([*(slack_until(f, len(f.steps)) for f in flows), after])
+        passed = [*before, *flows]
+        tracking = np.max([tail.tracking, *(s.tracking for f in passed for s in f.steps)], axis=0)
+        slack = least_slack([*(slack_until(f, len(f.steps)) for f in passed), after])
         return SafetyProof(slack, tail.start, tracking)
 
     def _unproved(self, flow: Flow, proved: int) -> str:
@@ -283,7 +406,7 @@ class Exploration:
 
 def _better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:
     """Whether a part of the starts got further than the whole did."""
-    if any(j in part.proofs for j in wanted) or (safety and part.safety is not None):
+    if any(j in part.proofs or j in part.waiting for j in wanted) or (safety and part.safety is not None):
         return True
     closer = any(part.missed[j].gauge < 0.9 * whole.missed[j].gauge for j in wanted if j in part.missed)
     return closer or part.safe_until > 1.1 * whole.safe_until
@@ -342,9 +465,14 @@ def sampled_violation(flow: Flow) -> bool:
 
 
 def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:
-    """What the parts prove together is proved of the whole."""
+    """What the parts prove together is proved of the whole; what some wait for, the whole waits for."""
+    found.parked = [flow for part in parts for flow in part.parked]
     for j in wanted:
         if j in found.proofs:
+            continue
+        if all(j in part.proofs or j in part.waiting for part in parts) and any(j in part.waiting for part in parts):
+            done = [part.proofs[j] for part in parts if j in part.proofs]
+            found.waiting[j] = done + [proof for part in parts for proof in part.waiting.get(j, [])]
             continue
         proof = together([part.proofs.get(j) for part in parts])
         if proof is not None:
@@ -354,7 +482,11 @@ def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], sa
             missed = [part.missed[j] for part in parts if j in part.missed]
             if missed:
                 found.missed[j] = max(missed, key=lambda m: m.gauge)
-    if safety:
+    safe = [part.safety for part in parts if part.safety is not None]
+    late = [part.waiting_safety for part in parts if part.waiting_safety is not None]
+    if safety and late and len(safe) + len(late) >= len(parts):
+        found.waiting_safety = safe + [proof for proofs in late for proof in proofs]
+    elif safety:
         found.safety = safe_together([part.safety for part in parts])
         if found.safety is None:
             found.safe_until = max(found.safe_until, min(part.safe_until for part in parts))

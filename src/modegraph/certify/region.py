@@ -95,6 +95,13 @@ class Region:
         """
         n = self.dim
         size = np.abs(p).sum(axis=-1)
+        if not np.isfinite(size).all():
+            known = np.isfinite(size).all(axis=1)
+            out = np.full(len(p), np.inf)
+            if known.any():
+                some = [G for G, fine in zip(generators, known, strict=True) if fine]
+                out[known] = self.gauges(bounds, p[known], some)
+            return out
         if self._faces is not None:
             q = np.einsum("fi,kin->kfn", self.A, p)
             spread = _generator_sizes(self.A, generators)
@@ -133,7 +140,7 @@ class Region:
                 plain = Y[:, :, :m] / piece.radius[:m]
                 start = constant - plain @ piece.middle[:m]
             head = np.full(len(y), np.inf)
-            fine = np.isfinite(plain).all(axis=(1, 2))
+            fine = np.isfinite(plain).all(axis=(1, 2)) & (np.abs(plain).max(axis=(1, 2), initial=0.0) < 1e100)
             if fine.any():
                 size = np.abs(plain[fine]).sum(axis=(1, 2)) + np.abs(constant[fine]).sum(axis=1)
                 head[fine] = np.sqrt((start[fine] ** 2).sum(axis=1)) + largest_singular_value(plain[fine])
@@ -174,6 +181,10 @@ class Region:
 
     def separated(self, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
         """For boxes (K, n): True where the box provably has no point in the set."""
+        known = np.isfinite(lo).all(axis=1) & np.isfinite(hi).all(axis=1)
+        return known & self._separated(np.where(known[:, None], lo, 0.0), np.where(known[:, None], hi, 0.0))
+
+    def _separated(self, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
         n = self.dim
         if self._faces is not None:
             least = np.where(self.A > 0.0, self.A * lo[:, None, :], self.A * hi[:, None, :]).sum(axis=2)

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ModegraphError
+from ..expression.evaluate import Evaluator
 from ..expression.tape import Tape, compile_tape
 from ..model.closed_loop import ClosedLoop, close_loop, mode_start
 from ..model.mode import Mode
 from ..model.sets import Set, is_subset
 from ..model.target import Target
-from ..reach.field import Field, compile_field, disturbance_box
+from ..reach.field import Field, Frame, compile_field, disturbance_box
 from ..reach.flow import Flow, Order
+from ..reach.parallelotope import slow_and_fast_axes
 from ..reach.start import Piece, whole
 from ..reach.tail import Tail, TailSearch
 from .counterexample import Equilibrium, PointRun, Scene, candidate_starts, enclose_equilibrium, trapped_in
@@ -61,6 +63,27 @@ class CompiledMode:
     @property
     def plant(self) -> int:
         return len(self.loop.states) - len(self.loop.reset)
+
+    def framed_fields(self) -> list[Field]:
+        """The fields in the modes of the loop, where a disturbance meets a nonlinear loop."""
+        if all(f.linear for f in self.fields) or not self.w_radius.any():
+            return self.fields
+        axes = slow_and_fast_axes(self._slope())
+        frame = None if (axes == np.eye(len(axes))).all() else Frame.of(axes)
+        if frame is None:
+            return self.fields
+        return [compile_field(self.loop, segment, frame) for segment in self.loop.segments]
+
+    def _slope(self) -> Floats:
+        """Float Jacobian (n, n) of the last segment at the centre of the starts."""
+        fld = self.fields[-1]
+        n = fld.states
+        x = np.zeros(n)
+        centre = np.asarray(self.start.center, float)
+        x[: len(centre)] = centre
+        d = [0.5 * (lo + hi) for lo, hi in self.unknowns.values()]
+        at = np.concatenate([x, [fld.start], self.w_centre, d])[:, None]
+        return np.asarray(Evaluator(fld.jacobian)(at)[: n * n, 0].reshape(n, n))
 
     def whole(self) -> Piece:
         return whole(self.start, list(self.unknowns.values()))
@@ -164,6 +187,7 @@ class _Unit:
         compiled = self.compiled
         exploration = Exploration(
             compiled.fields,
+            compiled.framed_fields(),
             [self.goals.get(k) for k in range(len(self.targets))],
             plant=compiled.plant,
             w=(compiled.w_centre, compiled.w_radius),
@@ -178,7 +202,7 @@ class _Unit:
         scene = self._scene()
         self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])
         wanted = [k for k in self.goals if k not in self.verdicts]
-        found = exploration.explore(compiled.whole(), wanted, safety=True)
+        found = exploration.decide(compiled.whole(), wanted)
         for k in wanted:
             if k in found.proofs:
                 self.verdicts[k] = certified_switch(found.proofs[k], self.horizon)

@@ -278,7 +278,7 @@ def remainders(
                 if alpha == 0.0 and beta == 0.0 and hi <= 0.0:
                     R[q] = 0.0
                 else:
-                    R[q] = (gap + abs(alpha) * (R[a] + r) + 4.0 * UNIT * (abs(alpha) * A[a] + abs(beta))) * UP
+                    R[q] = (gap + abs(alpha) * (R[a] + r) + 4.0 * UNIT * (abs(alpha) * A[a] + abs(beta))) * UP + TINY
             else:  # WHERE
                 branch = a if mid > 0.0 else b
                 r = 0.0

@@ -12,7 +12,7 @@ import math
 
 UNIT = 2.0**-53
 
-MAX_ROUNDINGS = 2**15
+MAX_ROUNDINGS = 2**19
 """No bound in the kernels is computed with more roundings than this on one path."""
 
 MAX_MONOMIALS = 2**14

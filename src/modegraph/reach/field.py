@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..expression.derivative import derivative
 from ..expression.evaluate import Evaluator
@@ -14,6 +17,7 @@ from ..expression.scalar import Expr, Graph
 from ..expression.simplify import simplify
 from ..expression.tape import Tape, compile_tape
 from ..model.closed_loop import ClosedLoop, Segment
+from ..model.sets.exact import inverse, matrix
 
 SIMPLIFY_SECONDS = 1.0
 """Longest time spent on cancelling terms of one closed loop; then the tape is used as written."""
@@ -23,7 +27,8 @@ SIMPLIFY_SECONDS = 1.0
 class Field:
     """x' = f(x, t, w, d) on one segment of the reference, with what is observed along it.
 
-    Variables of all tapes, in order: states (plant, then memory), time, disturbance, unknowns.
+    Variables of all tapes, in order: states (plant, then memory; in the frame's coordinates where there
+    is a frame), time, disturbance, unknowns.
 
     Attributes
     ----------
@@ -44,12 +49,13 @@ class Field:
     full_w : bool
         f is not affine in the disturbance.
     autonomous : bool
-        f and the constraints do not depend on time.
+        f, the constraints and what must be defined do not depend on time.
     """
 
     start: float
     end: float
     states: int
+    frame: Frame | None
     disturbances: int
     unknowns: tuple[str, ...]
     rates: Tape
@@ -63,7 +69,7 @@ class Field:
     reads: tuple[frozenset[int], ...]
     """For each state's rate: the states it reads."""
     observed_states: frozenset[int]
-    """States that a constraint reads."""
+    """States that a constraint reads, or a function that is not defined everywhere (cancelled or not)."""
 
     @property
     def time_index(self) -> int:
@@ -84,6 +90,56 @@ class Field:
     def evaluator(self) -> Evaluator:
         """Float evaluation of the rates for a batch of points."""
         return Evaluator(self.rates)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Coordinates y with x = V y, V (n, n) of short dyadic numbers, its inverse exact.
+
+    In the modes of the loop, errors of fast modes do not excite slow ones. In the coordinates of a
+    mechanical plant they do: the boxes that bound what is nonlinear ignore how accelerations hang
+    together through the inertia matrix.
+    """
+
+    V: NDArray[np.float64]
+    exact_inverse: tuple[tuple[Fraction, ...], ...]
+
+    @classmethod
+    def of(cls, axes: NDArray[np.float64]) -> Frame | None:
+        """The frame with nearly these columns; None if they are too nearly dependent."""
+        V = np.round(axes * 1024.0) / 1024.0
+        if not np.isfinite(V).all() or np.linalg.cond(V) > 1e3:
+            return None
+        rows = inverse(matrix(V))
+        return None if rows is None else cls(V, tuple(tuple(row) for row in rows))
+
+    @cached_property
+    def inverse(self) -> NDArray[np.float64]:
+        """The inverse, rounded to nearest (relative error of an entry at most 2**-53)."""
+        return np.array([[float(v) for v in row] for row in self.exact_inverse])
+
+    def substitute(self, graph: Graph, states: Sequence[Expr], exprs: Sequence[Expr]) -> list[Expr]:
+        """Expressions in x rewritten with x = V y."""
+        y = [graph.variable(f"~{k}") for k in range(len(states))]
+        known = {}
+        for i, x in enumerate(states):
+            total = graph.constant(0)
+            for k, weight in enumerate(self.V[i]):
+                total = total + y[k] * float(weight)
+            known[x.index] = total.index
+        return [Expr(graph, k) for k in graph.rewrite([e.index for e in exprs], known=known)]
+
+    def inverse_times(self, vector: Sequence[Expr]) -> list[Expr]:
+        """V^-1 v, exactly."""
+        graph = vector[0].graph
+        out = []
+        for row in self.exact_inverse:
+            total = graph.constant(0)
+            for weight, e in zip(row, vector, strict=True):
+                if weight:
+                    total = total + e * weight
+            out.append(total)
+        return out
 
 
 def _obligations(graph: Graph, roots: Sequence[int]) -> list[int]:
@@ -109,8 +165,8 @@ def _obligations(graph: Graph, roots: Sequence[int]) -> list[int]:
     return sorted(found)
 
 
-def compile_field(loop: ClosedLoop, segment: Segment) -> Field:
-    """Trace -> simplify -> differentiate -> tapes, for one segment."""
+def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None) -> Field:
+    """Trace -> simplify -> differentiate -> tapes, for one segment, in the coordinates of a frame."""
     graph = loop.graph
     states, disturbance = list(loop.states), list(loop.disturbance)
     unknowns = list(loop.unknowns.values())
@@ -135,21 +191,33 @@ def compile_field(loop: ClosedLoop, segment: Segment) -> Field:
     else:
         rates = simplify(written, seconds=SIMPLIFY_SECONDS).exprs
         by_w = derivative(rates, disturbance) if nw else by_w
-    by_x = derivative(rates, states)
     obligations += _obligations(graph, [*graph.dropped, *(e.index for e in rates)])
     unique = [Expr(graph, k) for k in dict.fromkeys(obligations)]
-    jacobian = [e for row in by_x for e in row] + [e for row in by_w for e in row]
     faces = [face.expr for face in segment.constraints]
     energy = graph.constant(0)
     for u in segment.inputs:
         energy = energy + u * u
     observed = [*faces, energy, *segment.tracking]
+    if frame is not None:
+        columns = [[by_w[i][j] for i in range(n)] for j in range(nw)]
+        framed = frame.substitute(graph, states, [*rates, *(e for c in columns for e in c), *unique, *observed])
+        inner = [graph.variable(f"~{k}") for k in range(n)]
+        variables[:n] = states = inner
+        rates = frame.inverse_times(framed[:n])
+        columns = [frame.inverse_times(framed[n + j * n : n + (j + 1) * n]) for j in range(nw)]
+        by_w = [[columns[j][i] for j in range(nw)] for i in range(n)]
+        unique = framed[n + n * nw : n + n * nw + len(unique)]
+        observed = framed[n + n * nw + len(unique) :]
+        faces = observed[: len(faces)]
+    by_x = derivative(rates, states)
+    jacobian = [e for row in by_x for e in row] + [e for row in by_w for e in row]
     roots = [e.index for e in jacobian[: n * (n + nw)]]
     linear = all(graph.nodes[k].op == CONST for k in roots)
     return Field(
         start=segment.start,
         end=segment.end,
         states=n,
+        frame=frame,
         disturbances=nw,
         unknowns=tuple(loop.unknowns),
         rates=compile_tape(rates, variables),
@@ -159,9 +227,11 @@ def compile_field(loop: ClosedLoop, segment: Segment) -> Field:
         outputs=len(segment.tracking),
         linear=linear and not unique,
         full_w=bool(nw) and not affine,
-        autonomous=not any(e.depends_on([loop.time]) for e in [*rates, *faces]),
+        autonomous=not any(e.depends_on([loop.time]) for e in [*rates, *faces, *unique]),
         reads=tuple(frozenset(k for k in range(n) if rate.depends_on([states[k]])) for rate in rates),
-        observed_states=frozenset(k for k in range(n) if any(e.depends_on([states[k]]) for e in faces)),
+        observed_states=frozenset(
+            k for k in range(n) if any(e.depends_on([states[k]]) for e in [*faces, *unique])
+        ),
     )
 
 

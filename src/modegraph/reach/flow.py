@@ -25,7 +25,7 @@ from ..enclosure.step import (
 )
 from ..expression.tape import Tape
 from .bounds import PolynomialBounds
-from .field import Field
+from .field import Field, Frame
 from .grid import next_instant
 from .start import Piece
 
@@ -47,6 +47,8 @@ DISTURBED_RATE_CAP = 0.2
 RESTART_STEPS, RESTART_FEEDBACK, RESTART_SHARE = 12, 0.1, 0.5
 """A disturbed flow is enclosed and started again after this many steps, when the remainder feeds
 itself by this share and is this large relative to the polynomial part."""
+FINE_RATE_CAP = 0.05
+"""The same where steps are cheap: linear loops and up to three states."""
 SMALLEST_STEP = 1e-7
 """A flowpipe stops when its step falls below this part of the time scale of the loop."""
 
@@ -122,7 +124,7 @@ class ErrorTable:
 @lru_cache(maxsize=64)
 def _error_table(m: int, q: int, n: int) -> ErrorTable:
     order = max(q, 1)
-    table = monomials((1,) * m + (1 if order <= 2 else 2,) * n, order)
+    table = monomials((1,) * m + (1 if order <= 3 else 2,) * n, order)
     owner = np.full(table.size, SET_VARIABLE, np.int64)
     owner[table.degree > q] = DROPPED
     for v in range(n):
@@ -149,6 +151,8 @@ class Flow:
     w_centre, w_radius : (q,) the disturbance set; for a fixed disturbance the radius is 0.
     order : degrees.
     reset : tape of the memory as a function of the plant state, where the piece is on the plant only.
+    framed : the piece is given in the coordinates of the fields' frame.
+    longest_step : seconds; switching instants are ends of steps, so steps must not be too long.
     t0, energy : seconds and a bound of int u'u at the start, for a flow that continues another.
     """
 
@@ -165,6 +169,8 @@ class Flow:
         stops: Sequence[float] = (),
         t0: float = 0.0,
         energy: float = 0.0,
+        framed: bool = False,
+        longest_step: float = np.inf,
     ) -> None:
         self.fields = list(fields)
         self.piece = piece
@@ -175,18 +181,21 @@ class Flow:
         q = min(order.jacobian, order.degree)
         self.small = int(self.table.start[q + 1])
         self.q = q
+        self.seen = min(order.degree, max(q, 2))
         self.failure: Failure | None = None
         self.time = t0
         self.segment = 0
         while self.fields[self.segment].end <= t0:
             self.segment += 1
         self.first_segment = self.segment
+        self.longest_step = longest_step
         self.stops = sorted(s for s in stops if s > t0)
         self.steps: list[Step] = []
         self.h = 0.0
         n = self.fields[0].states
         self.bounds = PolynomialBounds(piece, self.table, self.table.size)
-        self.small_bounds = PolynomialBounds(piece, self.table, self.small)
+        seen = int(self.table.start[self.seen + 1])
+        self.seen_bounds = PolynomialBounds(piece, self.table, seen)
         p, unknowns, slack = piece.polynomials(self.table.linear, self.table.size)
         self._unknowns = unknowns
         self._errors = error_table(self.table, self.q, n)
@@ -200,6 +209,9 @@ class Flow:
         self.undefined_start = False
         if reset is not None and p.shape[0] < n:
             p, slack = self._with_memory(p, slack, reset)
+        self.frame = self.fields[0].frame
+        if self.frame is not None and not framed:
+            p, slack = into_frame(self.frame, p, slack)
         if slack.any():
             G = np.zeros((n, n, self.small))
             G[np.arange(n), np.arange(n), 0] = slack * (1.0 + 4.0 * UNIT)
@@ -207,7 +219,7 @@ class Flow:
         self._p, self._G = p, G
         self._ebox = np.zeros(n)
         self._ybox = np.zeros(n)
-        self._energy = np.zeros(self.small)
+        self._energy = np.zeros(seen)
         self._energy_radius = energy
         self.feedback = 0.0
         self.next_restart = RESTART_STEPS
@@ -285,21 +297,21 @@ class Flow:
         if self.h <= 0.0:
             self.h = self._first_step()
         stop = min([limit, fld.end, *(s for s in self.stops if s > self.time)][:3])
-        h_try = self.h
+        h_try = min(self.h, self.longest_step)
         for _ in range(60):
             t1 = next_instant(self.time, h_try, stop)
             h = t1 - self.time
             outcome = self._attempt(fld, h)
             status, node, p, G, tube, bend, rest, control = outcome
             scale = TOLERANCE * (1.0 + np.abs(self._p[:, 0]).max())
-            if status == DONE:
+            if status == DONE and np.isfinite(control).all():
                 rate = control[0] / h
                 floor = max(scale, 0.3 * control[1] / h)
                 factor = 1.6 if rate <= 0.0 else min(1.6, max(0.3, 0.9 * (floor / rate) ** (1.0 / TIME_DEGREE)))
                 if rate > 4.0 * floor and h > 1e-4:
                     h_try = h * min(0.8, factor)
                     continue
-                caps = min((cap / value for value, cap in ((control[2], GROWTH_CAP), (control[3], RATE_CAP if not self.w_radius.any() else DISTURBED_RATE_CAP)) if value > 0.0), default=1.6)
+                caps = min((cap / value for value, cap in ((control[2], GROWTH_CAP), (control[3], self._rate_cap(fld))) if value > 0.0), default=1.6)
                 if caps < 0.5 and h > 1e-4:
                     h_try = h * caps
                     continue
@@ -321,6 +333,11 @@ class Flow:
             return False
         return True
 
+    def _rate_cap(self, fld: Field) -> float:
+        if not self.w_radius.any():
+            return RATE_CAP
+        return DISTURBED_RATE_CAP if fld.states > 3 and not fld.linear else FINE_RATE_CAP
+
     def _runs_away(self, G: Floats) -> bool:
         """Whether the remainder has begun its last growth: it feeds itself while the steps shrink."""
         size = float(generator_box(G).max(initial=0.0))
@@ -329,8 +346,8 @@ class Flow:
         back = RUNAWAY_STEPS
         if len(self._sizes) <= back or size == 0.0:
             return False
-        advanced = self.time - self.steps[-back].start
-        return size > 2.0 * self._sizes[-back - 1] and advanced < 0.35 * back * self._longest
+        length = self.steps[-1].end - self.steps[-1].start
+        return size > 2.0 * self._sizes[-back - 1] and length < 0.15 * self._longest and self.feedback > 0.5
 
     def _attempt(self, fld: Field, h: float) -> Any:
         f, j = fld.rates, fld.jacobian
@@ -343,7 +360,7 @@ class Flow:
         inputs[fld.first_w : fld.first_d, 0] = self.w_centre
         inputs[fld.first_d :] = self._unknowns
         n = fld.states
-        most = (30 if self.w_radius.any() else 12) * n + 8
+        most = ((60 if fld.linear or n < 4 else 60 if self.q <= 3 else 30) if self.w_radius.any() else 12) * n + 8
         moving = self.w_radius if self.w_radius.any() else np.zeros(0)
         outputs = j.outputs
         if not len(moving):
@@ -379,8 +396,8 @@ class Flow:
 
     def _observe(self, fld: Field, h: float, tube: Floats) -> tuple[Floats, Floats, float, Floats]:
         faces = len(fld.faces)
-        ends, slack = self._observed(fld, h, tube, self.q, 3)
-        upper = self._face_upper(self.small_bounds, ends, slack, faces)
+        ends, slack = self._observed(fld, h, tube, self.seen, 3)
+        upper = self._face_upper(self.seen_bounds, ends, slack, faces)
         if faces and not (upper <= 0.0).all():
             fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, TIME_DEGREE)
             fine = self._face_upper(self.bounds, fine_ends, fine_slack, faces)
@@ -394,7 +411,7 @@ class Flow:
         # Ends are added and compared in floats: one rounding each.
         upper = upper + 4.0 * UNIT * np.abs(upper)
         errors = ends[:2, faces + 1 :]
-        both = np.maximum(self.small_bounds.upper(errors), self.small_bounds.upper(-errors)).max(axis=0)
+        both = np.maximum(self.seen_bounds.upper(errors), self.seen_bounds.upper(-errors)).max(axis=0)
         tracking = both + slack[faces + 1 :, 0]
         return upper, ends[2, faces], float(slack[faces, 1]), tracking
 
@@ -420,6 +437,8 @@ class Flow:
 
     def _fail(self, fld: Field, status: int, node: int) -> None:
         widths = generator_box(self._G)
+        if self.frame is not None:
+            widths = np.abs(self.frame.V) @ widths
         worst = self.names[int(np.argmax(widths))] if len(widths) else ""
         if status == UNDEFINED:
             what = f"a function leaves its domain: {fld.rates.labels[node]}"
@@ -471,21 +490,58 @@ class Flow:
             return self.p0, self.G0
         return self.steps[k - 1].p, self.steps[k - 1].G
 
+    def state_set(self, k: int) -> tuple[Floats, Floats]:
+        """(p, G) at grid instant k in the coordinates of the states."""
+        p, G = self.set_at(k)
+        return (p, G) if self.frame is None else out_of_frame(self.frame, p, G)
+
+    def end_box(self) -> tuple[Floats, Floats]:
+        """Box (lo, hi), each (n,), of the last set."""
+        p, G = self.state_set(len(self.steps))
+        z = generator_box(G)
+        lo, hi = self.bounds.ranges(p)
+        return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
+
     def hulls(self) -> tuple[Floats, Floats]:
         """Boxes (steps + 1, n) of the sets at the grid instants."""
-        polynomials = np.stack([self.set_at(k)[0] for k in range(len(self.steps) + 1)])
-        z = np.stack([generator_box(self.set_at(k)[1]) for k in range(len(self.steps) + 1)])
+        sets = [self.state_set(k) for k in range(len(self.steps) + 1)]
+        polynomials = np.stack([p for p, _ in sets])
+        z = np.stack([generator_box(G) for _, G in sets])
         lo, hi = self.bounds.ranges(polynomials)
         return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
 
+    def swell(self, step: Step) -> Floats:
+        """Box (n,) by which the tube of a step exceeds the hull of p at its ends, state coordinates."""
+        out = step.bend + step.tube
+        if self.frame is not None:
+            out = np.abs(self.frame.V) @ out * (1.0 + 8.0 * (len(out) + 2) * UNIT)
+        return np.asarray(out)
+
     def tubes(self) -> tuple[Floats, Floats]:
         """Boxes (steps, n) of everything passed during each closed step."""
-        polynomials = np.stack([self.set_at(k)[0] for k in range(len(self.steps) + 1)])
+        polynomials = np.stack([self.state_set(k)[0] for k in range(len(self.steps) + 1)])
         lo, hi = self.bounds.ranges(polynomials)
-        out = np.stack([s.bend + s.tube for s in self.steps])
+        out = np.stack([self.swell(s) for s in self.steps])
         below = np.minimum(lo[:-1], lo[1:]) - out
         above = np.maximum(hi[:-1], hi[1:]) + out
         return np.nextafter(below, -np.inf), np.nextafter(above, np.inf)
+
+
+def into_frame(frame: Frame, p: Floats, slack: Floats) -> tuple[Floats, Floats]:
+    """Polynomials V^-1 p and a box (n,) for V^-1 of the old box and what rounding loses."""
+    size = np.abs(frame.inverse) @ (np.abs(p).sum(axis=1) + slack)
+    count = p.shape[0] + p.shape[1] + 8
+    return frame.inverse @ p, np.abs(frame.inverse) @ slack * (1.0 + 1e-12) + 4.0 * count * UNIT * size
+
+
+def out_of_frame(frame: Frame, p: Floats, G: Floats) -> tuple[Floats, Floats]:
+    """V p and V G; what rounding loses is appended as axis generators."""
+    n = len(p)
+    size = np.abs(frame.V) @ (np.abs(p).sum(axis=1) + generator_box(G))
+    out = np.zeros((len(G) + n, n, G.shape[2]))
+    out[: len(G)] = np.einsum("ij,gjk->gik", frame.V, G)
+    out[len(G) + np.arange(n), np.arange(n), 0] = 4.0 * (p.shape[1] + G.shape[0] * G.shape[2] + n + 8) * UNIT * size
+    return frame.V @ p, out
 
 
 def generator_box(G: Floats) -> Floats:

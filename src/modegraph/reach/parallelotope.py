@@ -8,18 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.rounding import UNIT
-from .flow import Flow, generator_box
+from .bounds import PolynomialBounds
+from .flow import generator_box
 
 Floats = NDArray[np.float64]
 
 
-def half_widths(flow: Flow, axes: Floats, centre: Floats, states: Sequence[int]) -> Floats:
-    """Bounds of |V^-1 (x - centre)| over the set at the end of the flow, for the listed states.
+def half_widths(bounds: PolynomialBounds, p: Floats, G: Floats, axes: Floats, centre: Floats) -> Floats:
+    """Bounds (k,) of |V^-1 (x - centre)| over the set p(xi) + sum_g G_g(xi) zeta_g in k coordinates.
 
     ``axes`` V (k, k). With any N near V^-1 and R = N V - I, V^-1 y = (I + R)^-1 N y, so the bound of
     N y grows by |R| / (1 - |R|) of its largest entry. Infinite where V is too close to singular.
     """
-    k = len(states)
+    k = len(p)
+    if not (np.isfinite(axes).all() and np.isfinite(p).all() and np.isfinite(G).all()):
+        return np.full(k, np.inf)
     try:
         N = np.linalg.inv(axes)
     except np.linalg.LinAlgError:
@@ -28,14 +31,12 @@ def half_widths(flow: Flow, axes: Floats, centre: Floats, states: Sequence[int])
     off = float(miss.sum(axis=1).max()) * (1.0 + 8.0 * k * UNIT)
     if not off < 0.01:
         return np.full(k, np.inf)
-    p, G = flow.set_at(len(flow.steps))
-    p, G = p[list(states)], G[:, list(states)]
     shifted = p.copy()
     shifted[:, 0] -= centre
     size = np.abs(p).sum(axis=1) + np.abs(centre) + generator_box(G)
     q = N @ shifted
     spread = np.abs(np.einsum("fi,gin->fgn", N, G)).sum(axis=(1, 2)) * (1.0 + 4.0 * (G.size + 4) * UNIT)
-    reach = np.maximum(flow.bounds.upper(q), flow.bounds.upper(-q)) + spread
+    reach = np.maximum(bounds.upper(q), bounds.upper(-q)) + spread
     reach = reach + 8.0 * (k + 4) * UNIT * (np.abs(N) @ size)
     return np.asarray((reach + 2.0 * off * reach.max(initial=0.0)) * (1.0 + 4.0 * UNIT))
 
@@ -43,42 +44,79 @@ def half_widths(flow: Flow, axes: Floats, centre: Floats, states: Sequence[int])
 def modal_axes(slope: Floats) -> Floats:
     """Unit vectors along the real and imaginary parts of the eigenvectors of (n, n), as columns.
 
-    The identity where they are too nearly dependent.
+    Slowest mode first; the identity where they are too nearly dependent.
+    """
+    axes = _eigenvectors(slope)
+    return axes if axes is not None and np.linalg.cond(axes) < 1e4 else np.eye(len(slope))
+
+
+def slow_and_fast_axes(slope: Floats) -> Floats:
+    """Orthonormal bases of the invariant subspaces of the slow and of the fast modes, as columns.
+
+    They are told apart at the largest gap between decay rates; the identity where there is none.
+    Inside each group nothing is separated: nearly parallel modes would only make the frame skew.
     """
     n = len(slope)
-    if np.isfinite(slope).all():
-        values, vectors = np.linalg.eig(slope)
-        columns = []
-        for value, vector in zip(values, vectors.T, strict=True):
-            if value.imag > 0.0:
-                columns += [vector.real, vector.imag]
-            elif value.imag == 0.0:
-                columns.append(vector.real)
-        axes = np.array(columns).T
-        if axes.shape == (n, n):
-            axes = axes / np.maximum(np.linalg.norm(axes, axis=0), 1e-300)
-            if np.isfinite(axes).all() and np.linalg.cond(axes) < 1e4:
-                return axes
-    return np.eye(n)
+    axes = _eigenvectors(slope)
+    if axes is None or n < 2:
+        return np.eye(n)
+    ratios = _rate_ratios(slope)
+    slow = int(np.argmax(ratios)) + 1
+    if ratios[slow - 1] < 2.0:
+        return np.eye(n)
+    return np.hstack([np.linalg.qr(axes[:, :slow])[0], np.linalg.qr(axes[:, slow:])[0]])
 
 
-def principal_axes(flow: Flow) -> Floats:
-    """Principal directions of the linear part and the generators at the end of the flow."""
-    p, G = flow.set_at(len(flow.steps))
-    vectors = np.hstack([flow.bounds.linear_part(p), G[:, :, 0].T])
+def mode_gap(slope: Floats) -> float:
+    """Largest ratio of neighbouring decay rates."""
+    return float(_rate_ratios(slope).max(initial=1.0)) if np.isfinite(slope).all() else 1.0
+
+
+def _rate_ratios(slope: Floats) -> Floats:
+    rates = np.sort(np.abs(np.linalg.eigvals(slope).real))
+    return np.asarray(rates[1:] / np.maximum(rates[:-1], 1e-9))
+
+
+def _eigenvectors(slope: Floats) -> Floats | None:
+    n = len(slope)
+    if not np.isfinite(slope).all():
+        return None
+    values, vectors = np.linalg.eig(slope)
+    columns = []
+    for k in np.argsort(np.abs(values.real), kind="stable"):
+        if values[k].imag > 0.0:
+            columns += [vectors[:, k].real, vectors[:, k].imag]
+        elif values[k].imag == 0.0:
+            columns.append(vectors[:, k].real)
+    axes = np.array(columns).T
+    if axes.shape != (n, n):
+        return None
+    axes = axes / np.maximum(np.linalg.norm(axes, axis=0), 1e-300)
+    return axes if np.isfinite(axes).all() else None
+
+
+def principal_axes(bounds: PolynomialBounds, p: Floats, G: Floats) -> Floats:
+    """Principal directions of the linear part and the generators."""
+    vectors = np.hstack([bounds.linear_part(p), G[:, :, 0].T])
+    if not np.isfinite(vectors).all():
+        return np.eye(len(p))
     scale = np.maximum(np.abs(vectors).sum(axis=1), 1e-300)
     U = np.linalg.svd(vectors / scale[:, None], full_matrices=True)[0]
     axes = U * scale[:, None]
     return np.asarray(axes / np.linalg.norm(axes, axis=0))
 
 
-def tightest(flow: Flow, candidates: Sequence[Floats], centre: Floats) -> tuple[Floats, Floats] | None:
-    """(axes, half-widths) of the candidate frame whose parallelotope around the set is smallest."""
-    states = range(len(centre))
+def tightest(
+    sets: Sequence[tuple[PolynomialBounds, Floats, Floats]], candidates: Sequence[Floats], centre: Floats
+) -> tuple[Floats, Floats] | None:
+    """(axes, half-widths) of the candidate frame whose parallelotope around the sets is smallest.
+
+    Each set is (bounds, p, G) as in `half_widths`.
+    """
     best: tuple[Floats, Floats] | None = None
     least = np.inf
     for axes in candidates:
-        widths = half_widths(flow, axes, centre, list(states))
+        widths = np.max([half_widths(bounds, p, G, axes, centre) for bounds, p, G in sets], axis=0)
         if not np.isfinite(widths).all():
             continue
         volume = float(np.log(np.maximum(widths, 1e-300)).sum() + np.log(max(abs(np.linalg.det(axes)), 1e-300)))

@@ -170,9 +170,11 @@ class Piece:
         radius = np.maximum(self.radius[:m], 1e-300)
         plain = coefficients[..., :m] / radius
         with np.errstate(over="ignore"):
-            ball = np.sqrt((plain**2).sum(axis=-1)) - plain @ self.middle[:m]
+            # Scaled before squaring: tiny coefficients must not underflow to a length of zero.
+            top = np.maximum(np.abs(plain).max(axis=-1, initial=0.0), 1e-300)
+            ball = np.sqrt(((plain / top[..., None]) ** 2).sum(axis=-1)) * top - plain @ self.middle[:m]
         ball = ball + size[..., m:].sum(axis=-1)
-        slack = (np.abs(plain).sum(axis=-1) + box) * (8.0 * (m + 4)) * UNIT
+        slack = (np.abs(plain).sum(axis=-1) + box) * (8.0 * (m + 4)) * UNIT + m * 1e-307
         return np.asarray(np.fmin(box * (1.0 + 4.0 * len(self.lo) * UNIT), ball + slack))
 
 

@@ -51,7 +51,10 @@ class TailFailure:
 
 
 def relevant_states(fld: Field) -> list[int]:
-    """States that a constraint reads, or that feed back into such a state or into themselves."""
+    """States that a constraint or a function with a restricted domain reads, and what feeds them.
+
+    The others grow by what these do and by nothing else: they exist for all time.
+    """
     keep = set(range(fld.states))
     while True:
         readers = {k: [i for i in keep if k in fld.reads[i]] for k in keep}
@@ -98,9 +101,9 @@ class TailSearch:
         for _ in range(12):
             rate = self._evaluate(self._inputs(x))[keep, 0]
             slope = self._jacobian(x)[np.ix_(keep, keep)]
-            step = np.linalg.lstsq(slope, -rate, rcond=1e-12)[0]
-            if not np.isfinite(step).all():
+            if not (np.isfinite(rate).all() and np.isfinite(slope).all()):
                 return None
+            step = np.linalg.lstsq(slope, -rate, rcond=1e-12)[0]
             x[keep] += step
             if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + np.abs(x).max()):
                 break
@@ -117,10 +120,7 @@ class TailSearch:
         start = max(flow.time for flow in flows)
         if not keep:
             return self._nothing_moves(flows, start)
-        hulls = [flow.hulls() for flow in flows]
-        lo = np.min([h[0][-1] for h in hulls], axis=0)
-        hi = np.max([h[1][-1] for h in hulls], axis=0)
-        centre = self._equilibrium(0.5 * (lo + hi))
+        centre = self._equilibrium(np.mean([flow.set_at(len(flow.steps))[0][:, 0] for flow in flows], axis=0))
         if centre is None:
             return TailFailure("no equilibrium was found near the end of the flowpipe")
         slope = self._jacobian(centre)[np.ix_(keep, keep)]
@@ -134,7 +134,7 @@ class TailSearch:
             )
         reason = "the modes of the loop are nearly parallel"
         for frame in (modal_axes(slope), np.eye(len(keep))):
-            widest = np.max([half_widths(flow, frame, centre[keep], keep) for flow in flows], axis=0)
+            widest = np.max([self._half_widths(flow, frame, centre) for flow in flows], axis=0)
             if not np.isfinite(widest).all():
                 continue
             size = np.maximum(widest * 1.02, FLOOR * widest.max())
@@ -177,7 +177,7 @@ class TailSearch:
         d = int((chart.unknown_lo < chart.unknown_hi).sum())
         piece = Piece(chart, -np.ones(k + d), np.ones(k + d))
         last = replace(self.fld, start=0.0)
-        flow = Flow([last], piece, self.w_centre, self.w_radius, self.order, names=self.names)
+        flow = Flow([last], piece, self.w_centre, self.w_radius, self.order, names=self.names, framed=True)
         span = 25.0 / decay
         while flow.time < span and len(flow.steps) < 400:
             if not flow.advance(span):
@@ -190,9 +190,13 @@ class TailSearch:
                 return self._tail(flow, start, decay)
         return TailFailure("the candidate set does not return into itself")
 
-    def _inside(self, flow: Flow, axes: Floats, centre: Floats) -> bool:
+    def _half_widths(self, flow: Flow, axes: Floats, centre: Floats) -> Floats:
         keep = self.states
-        return bool((half_widths(flow, axes[keep], centre[keep], keep) < 1.0).all())
+        p, G = flow.set_at(len(flow.steps))
+        return half_widths(flow.bounds, p[keep], G[:, keep], axes, centre[keep])
+
+    def _inside(self, flow: Flow, axes: Floats, centre: Floats) -> bool:
+        return bool((self._half_widths(flow, axes[self.states], centre) < 1.0).all())
 
     def _tail(self, flow: Flow, start: float, decay: float) -> Tail:
         lo, hi = flow.tubes()
@@ -201,6 +205,8 @@ class TailSearch:
         if len(self.states) < self.fld.states:
             tracking = np.full(self.fld.outputs, np.inf)
         below, above = np.full(self.fld.states, -np.inf), np.full(self.fld.states, np.inf)
-        below[self.states] = lo.min(axis=0)[self.states]
-        above[self.states] = hi.max(axis=0)[self.states]
+        if flow.frame is None or len(self.states) == self.fld.states:
+            kept = self.states if flow.frame is None else list(range(self.fld.states))
+            below[kept] = lo.min(axis=0)[kept]
+            above[kept] = hi.max(axis=0)[kept]
         return Tail(start, faces, tracking, below, above, decay)

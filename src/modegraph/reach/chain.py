@@ -1,0 +1,98 @@
+"""A flowpipe of one piece that is started again where a disturbance makes that tighter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from .compiled import CompiledMode
+from .field import Field
+from .flow import RESTART_STEPS, Flow, Order
+from .parallelotope import mode_gap
+from .restart import restarted
+from .start import Piece
+
+WIDE_GAP = 8.0
+"""Ratio of the fastest to the slowest mode from which the frame of the modes is used at once."""
+RESTARTED, CHEAP, MOST_RESTARTED = Order(4, 3), Order(3, 2), 330
+"""Degrees after a restart, if that makes at most so many monomials, or else."""
+
+
+class Chain:
+    """Flows of one piece; each but the first continues from an enclosure of the end of the one before."""
+
+    def __init__(self, compiled: CompiledMode, framed: Sequence[Field], piece: Piece, order: Order) -> None:
+        self.piece = piece
+        self.order = order
+        self.framed = framed
+        self.compiled = compiled
+        first = Flow(
+            compiled.fields, piece, compiled.w_centre, compiled.w_radius, order,
+            names=compiled.loop.names, reset=compiled.own_reset, stops=compiled.stops,
+        )  # fmt: skip
+        self.flows = [first]
+        self.failure = "" if first.failure is None else str(first.failure)
+        """Why it stopped; empty while it has not."""
+        self.begun = first.failure is None
+
+    def run(self, end: float) -> bool:
+        """Advance until ``end``; False when the flowpipe failed before."""
+        while self.flows[-1].time < end:
+            flow = self.flows[-1]
+            if not flow.advance(end):
+                self.failure = str(flow.failure)
+                self._drop_unbounded()
+                return False
+            if not self.compiled.linear and flow.wants_restart():
+                self._restart(end)
+        return True
+
+    def _restart(self, end: float) -> None:
+        """In the coordinates of the plant first, then in the frame of the modes, tighter in the end."""
+        flow = self.flows[-1]
+        in_modes = len(self.flows) > 1 or mode_gap(flow.slope) > WIDE_GAP
+        fields = self.framed if in_modes else self.compiled.fields
+        variables = len(self.compiled.loop.states) + len(self.piece.uncertain)
+        order = RESTARTED if math.comb(variables + RESTARTED.degree, variables) <= MOST_RESTARTED else CHEAP
+        following = restarted([flow], fields, order)
+        if following is None or flow.time >= end or not following.advance(end):
+            flow.next_restart = len(flow.steps) + RESTART_STEPS
+        else:
+            self.flows.append(following)
+
+    def _drop_unbounded(self) -> None:
+        """Take back last steps whose bounds are not finite."""
+        flow = self.flows[-1]
+        while flow.steps:
+            last = flow.steps[-1]
+            if all(np.isfinite(a).all() for a in (last.p, last.G, last.tube, last.bend)):
+                break
+            flow.steps.pop()
+        if not flow.steps and len(self.flows) > 1:
+            self.flows.pop()
+
+    @property
+    def time(self) -> float:
+        """Instant until which everything is enclosed, seconds."""
+        steps = self.flows[-1].steps
+        return steps[-1].end if steps else 0.0
+
+    @property
+    def steps(self) -> int:
+        return sum(len(flow.steps) for flow in self.flows)
+
+
+def nonlinear_variable(flow: Flow) -> int:
+    """The variable with the largest share in the nonlinear terms early in the flow, or else in the width."""
+    p, _ = flow.set_at(max(1, len(flow.steps) // 3) if flow.steps else 0)
+    exponents = flow.bounds.exponents
+    weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
+    higher = exponents.sum(axis=1) > 1
+    share = np.zeros((2, flow.piece.variables))
+    for v in range(flow.piece.variables):
+        reads = exponents[:, v] > 0
+        for row, used in enumerate((reads & higher, reads)):
+            share[row, v] = float((np.abs(p[:, used]) * exponents[used, v]).sum(axis=1) @ weight)
+    return int(np.argmax(share[0] if share[0].any() else share[1]))

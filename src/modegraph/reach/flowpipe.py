@@ -1,0 +1,325 @@
+"""Everything a mode can reach from its start set until a horizon, as boxes at and between instants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from copy import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ModegraphError
+from ..model.mode import Mode
+from ..model.sets import Box, Set
+from .chain import Chain, nonlinear_variable
+from .compiled import CompiledMode, compile_mode
+from .field import Field
+from .flow import Order, generator_box
+from .slices import Slice, Slicer, hull
+from .start import Piece
+
+Floats = NDArray[np.float64]
+
+LADDER = ((3, 2), (4, 3), (6, 3), (8, 4), (10, 4))
+"""Degrees of p and of the Jacobian flow; higher ones are tried where lower ones are loose or break down."""
+LIGHT_MONOMIALS = 130
+"""The first degree tried is the highest with at most so many monomials: up to there it costs nothing."""
+MOST_MONOMIALS, MOST_GENERATOR_MONOMIALS = 1300, 100
+LOOSE = 5e-3
+"""Share of the remainder in the width of the last set above which a higher degree is tried."""
+MOST_PIECES = 32
+DEEPEST_CUT = 7
+PROGRESS = 1.05
+"""A cut or a higher degree must get this much further, or it is the last one."""
+DEFAULT_HORIZON = 10.0
+"""Seconds, for a set-point mode without a horizon."""
+
+
+class Flowpipe:
+    """An enclosure of all trajectories of one mode under one reference. Made by :func:`flowpipe`.
+
+    Attributes
+    ----------
+    times : (k,) array
+        Increasing instants of the grid, from 0 to the computed time, in seconds: breakpoints, the
+        duration of the reference and the horizon are among them. Boxes are tightest there.
+        Empty when not even the start is defined.
+    complete : bool
+        Whether the horizon was reached.
+    reason : str
+        When not complete: at what time, which state, why, and what would help.
+    states : tuple[str, ...]
+        Names of the coordinates of the boxes: states, then memory.
+    """
+
+    def __init__(
+        self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str
+    ) -> None:
+        self.states = tuple(states)
+        self.horizon = horizon
+        self.complete = not any(chain.failure for chain in chains)
+        self._label = label
+        self._parts = [[Slicer(flow) for flow in chain.flows] for chain in chains]
+        self._boxes: dict[tuple[float, float], Box] = {}
+        begun = all(chain.begun for chain in chains)
+        until = min(chain.time for chain in chains)
+        instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
+        self.times: Floats = instants[instants <= until] if begun else np.zeros(0)
+        count = len(chains)
+        pieces = "1 piece" if count == 1 else f"{count} pieces"
+        steps = sum(chain.steps for chain in chains)
+        if self.complete:
+            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {steps} steps)"
+        else:
+            first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
+            self.reason = (
+                f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
+            )
+
+    def at(self, t: float) -> Box:
+        """Box over states, then memory, around every state that is possible at time t (seconds).
+
+        Raises
+        ------
+        ModegraphError
+            Before 0 or past the computed time.
+        """
+        return self.hull(t, t)
+
+    def hull(self, t0: float, t1: float) -> Box:
+        """Box over states, then memory, around everything passed in the closed interval [t0, t1] (seconds).
+
+        Raises
+        ------
+        ModegraphError
+            If the interval is empty or leaves the computed time.
+        """
+        a, b = self._instant(t0, "t0"), self._instant(t1, "t1")
+        if a > b:
+            raise ModegraphError(
+                f"{self._label}: flowpipe.hull: t0 = {a:.6g} is after t1 = {b:.6g}; exchange them"
+            )
+        if (a, b) not in self._boxes:
+            slices = [s for part in self._parts for s in _slices(part, a, b)]
+            self._boxes[a, b] = Box(*hull(slices))
+        return self._boxes[a, b]
+
+    def _instant(self, t: Any, name: str) -> float:
+        try:
+            value = float(t)
+        except (TypeError, ValueError):
+            value = math.nan
+        if math.isnan(value):
+            raise ModegraphError(f"{self._label}: flowpipe: {name} must be a time in seconds, got {t!r}")
+        if not len(self.times):
+            raise ModegraphError(f"nothing was computed: {self.reason}")
+        until = float(self.times[-1])
+        if value < 0.0:
+            raise ModegraphError(
+                f"{self._label}: flowpipe asked at t = {value:.6g} s; time starts at 0 on entering the mode"
+            )
+        if value > until:
+            why = "give flowpipe a longer horizon=" if self.complete else f"it is incomplete: {self.reason}"
+            raise ModegraphError(
+                f"{self._label}: flowpipe asked at t = {value:.9g} s, computed until t = {until:.9g} s; {why}"
+            )
+        return value
+
+    def tubes(self) -> tuple[Floats, list[tuple[Floats, Floats]]]:
+        """For drawing: the grid (k,), and quick boxes (lo, hi) of each piece between instants, (k - 1, n)."""
+        middles = 0.5 * (self.times[:-1] + self.times[1:])
+        found = []
+        for part in self._parts:
+            ends = np.concatenate([slicer.times[1:] for slicer in part])
+            boxes = [slicer.steps() for slicer in part if len(slicer.times) > 1]
+            index = np.searchsorted(ends, middles)
+            found.append((np.vstack([b[0] for b in boxes])[index], np.vstack([b[1] for b in boxes])[index]))
+        return self.times, found
+
+    def plot(self, ax: Any = None, dims: int | str | Sequence[int | str] | None = None) -> Any:
+        """Draw the boxes of the flowpipe and return the axes.
+
+        Parameters
+        ----------
+        dims : state number(s) or name(s), optional
+            One state: over time. Two: the phase plane. None: all states over time.
+        """
+        from modegraph.report.flowpipes import plot_flowpipe
+
+        return plot_flowpipe(self, ax, self._dims(dims))
+
+    def _dims(self, dims: int | str | Sequence[int | str] | None) -> tuple[int, ...] | None:
+        if dims is None:
+            return None
+        listed = [dims] if isinstance(dims, int | np.integer | str) else list(dims)
+        found = []
+        for d in listed:
+            k = self.states.index(d) if d in self.states else d
+            if not isinstance(k, int | np.integer) or not 0 <= k < len(self.states):
+                raise ModegraphError(
+                    f"{self._label}: flowpipe.plot: dims names no state {d!r}; there is "
+                    f"{', '.join(self.states)} (0 to {len(self.states) - 1})"
+                )
+            found.append(int(k))
+        if len(found) not in (1, 2):
+            raise ModegraphError(
+                f"{self._label}: flowpipe.plot: dims takes one state (over time) or two (phase plane), "
+                f"got {len(found)}"
+            )
+        return tuple(found)
+
+    def __repr__(self) -> str:
+        until = f"{self.times[-1]:.6g}" if len(self.times) else "nothing"
+        return f"Flowpipe({self._label}, until={until}, complete={self.complete})"
+
+
+def _slices(part: Sequence[Slicer], a: float, b: float) -> list[Slice]:
+    """Slices of one piece in [a, b]."""
+    if a == b:
+        slicer = next(s for s in part if s.times[-1] >= a)
+        return [slicer.at(a)]
+    found: list[Slice] = []
+    for slicer in part:
+        begin, end = max(a, float(slicer.times[0])), min(b, float(slicer.times[-1]))
+        if begin < end:
+            found += slicer.over(begin, end)
+    return found
+
+
+def flowpipe(
+    mode: Mode, r: ArrayLike | None = None, horizon: float | None = None, start: Set | None = None
+) -> Flowpipe:
+    """Enclose all trajectories of a mode, for every start, unknown constant and disturbance.
+
+    Constraints are not looked at. Where the enclosure breaks down, a higher degree is tried, then the
+    start set is cut; what cannot be carried to the horizon is kept as far as it goes.
+
+    Parameters
+    ----------
+    r : (m,) array, optional
+        Which reference of the mode's class; may be left out when there is only one.
+    horizon : float, optional
+        Seconds. Default: the mode's horizon; else the duration of its reference; else 10 s.
+    start : Set, optional
+        Instead of the mode's start set; over plant states, or plant states and memory.
+
+    Raises
+    ------
+    ModegraphError
+        If the model or an argument is wrong; names the mode and the remedy.
+    """
+    if not isinstance(mode, Mode):
+        raise ModegraphError(
+            f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each"
+        )
+    p = mode.reference.parameters()[mode.match(r)]
+    if start is not None:
+        mode = copy(mode)
+        mode.start = start
+    label = f"mode {mode.label_of(p)!r}"
+    end = _horizon(mode, horizon, label)
+    compiled = compile_mode(mode, p, observed=False)
+    chains, stuck = _Cutting(compiled, end).run()
+    return Flowpipe(label, compiled.loop.names, end, chains, stuck)
+
+
+def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
+    if horizon is None:
+        return mode.horizon or mode.reference.duration or DEFAULT_HORIZON
+    try:
+        end = float(horizon)
+    except (TypeError, ValueError):
+        end = math.nan
+    if not 0.0 < end < math.inf:
+        raise ModegraphError(
+            f"{label}: flowpipe: horizon must be a positive, finite time in seconds, got {horizon!r}"
+        )
+    return end
+
+
+def orders(compiled: CompiledMode, variables: int) -> list[Order]:
+    """Degrees to try for a piece with so many variables, lowest first. Linear loops need degree 1."""
+    if compiled.linear or variables == 0:
+        return [Order(1, 0)]
+    found: list[Order] = []
+    for degree, jacobian in LADDER:
+        count = math.comb(variables + degree, degree)
+        if found and count > MOST_MONOMIALS:
+            break
+        while jacobian > 1 and math.comb(variables + jacobian, jacobian) > MOST_GENERATOR_MONOMIALS:
+            jacobian -= 1
+        order = Order(degree, jacobian)
+        if count <= LIGHT_MONOMIALS and degree <= 8:
+            found = [order]
+        else:
+            found.append(order)
+    return found
+
+
+class _Cutting:
+    """Pieces of the start set, cut where the flowpipe ends first, as long as that gets further."""
+
+    def __init__(self, compiled: CompiledMode, end: float) -> None:
+        self.compiled, self.end = compiled, end
+        self.framed: Sequence[Field] = compiled.framed_fields()
+        self.disturbed = bool(compiled.w_radius.any())
+
+    def run(self) -> tuple[list[Chain], str]:
+        """A chain for each piece, and why cutting ended where it failed."""
+        chains = [self._best(self.compiled.whole(), 0)]
+        while True:
+            failed = [chain for chain in chains if chain.failure]
+            if not failed:
+                return chains, ""
+            worst = min(failed, key=lambda chain: chain.time)
+            if worst.piece.variables == 0:
+                return chains, ""
+            if len(chains) >= MOST_PIECES or worst.piece.depth >= DEEPEST_CUT:
+                return chains, "; no more are tried"
+            halves = worst.piece.split(nonlinear_variable(worst.flows[0]))
+            first = self._rung(worst)
+            parts = [self._best(half, first) for half in halves]
+            if min(part.time for part in parts) <= PROGRESS * worst.time:
+                return chains, "; cutting it gets no further"
+            chains = [chain for chain in chains if chain is not worst] + parts
+
+    def _rung(self, chain: Chain) -> int:
+        return orders(self.compiled, chain.piece.variables).index(chain.order)
+
+    def _best(self, piece: Piece, first: int) -> Chain:
+        """The chain of a piece with the first degree that is good enough, or the best one."""
+        ladder = orders(self.compiled, piece.variables)
+        best: Chain | None = None
+        for order in ladder[first:]:
+            chain = Chain(self.compiled, self.framed, piece, order)
+            done = chain.run(self.end)
+            if best is not None and not _further(chain, best):
+                return best
+            best = chain
+            if not chain.begun or (done and (self.disturbed or not _loose(chain))):
+                break
+        assert best is not None
+        return best
+
+
+def _further(chain: Chain, other: Chain) -> bool:
+    """Whether a chain of higher degree is worth its cost: it gets further, or is narrower at the end."""
+    if chain.failure or other.failure:
+        return chain.time > PROGRESS * other.time
+    return float(_remainder(chain)[0].max()) < float(_remainder(other)[0].max())
+
+
+def _remainder(chain: Chain) -> tuple[Floats, Floats]:
+    """Radii (n,) of the last set: of its remainder, and of its polynomial part."""
+    flow = chain.flows[-1]
+    p, G = flow.state_set(len(flow.steps))
+    return generator_box(G), np.abs(p[:, 1:]).sum(axis=1)
+
+
+def _loose(chain: Chain) -> bool:
+    """Whether the remainder counts in the width of the last set, beyond what time steps leave."""
+    z, own = _remainder(chain)
+    size = float(np.abs(chain.flows[-1].set_at(0)[0]).sum(axis=1).max())
+    return bool((z > LOOSE * own + 1e-6 * size).any())
