@@ -33,6 +33,7 @@ DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 WIDE_GAP = 8.0
+TOO_MUCH_FEEDBACK = 0.5
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
@@ -92,6 +93,8 @@ class Exploration:
         self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
         self.deadline, self.tick = deadline, tick
         self.parts = 0
+        self.continued: dict[int, Flow] = {}
+        self.chains: dict[int, Findings] = {}
         self.linear = all(f.linear for f in fields)
 
     # -- orders ----------------------------------------------------------------------------------
@@ -114,35 +117,58 @@ class Exploration:
         """Decide the wanted goals and the check for all starts."""
         found = self.explore(piece, wanted, safety=True)
         if found.parked:
+            chains = [self.chains[id(flow)] for flow in found.parked]
+            parts = [part for part in chains if not part.parked]
+            open_chains = [part for part in chains if part.parked]
             # Parts of a loop that does not depend on time may go on together, from the latest of
             # their instants: their trajectories are there earlier.
-            groups = [found.parked] if all(f.autonomous for f in self.fields) else [[f] for f in found.parked]
-            self._finish(found, [part for group in groups for part in self._groups(group, found)])
+            together_ = all(f.autonomous for f in self.fields)
+            groups = [open_chains] if together_ else [[part] for part in open_chains]
+            parts += [part for group in groups if group for part in self._groups(group, found)]
+            self._finish(found, parts)
         return found
 
-    def _groups(self, parked: list[Flow], found: Findings) -> list[Findings]:
-        """Parked flows together, or in halves where all of them are too much."""
-        part = self._together(parked, found)
-        decided = all(j in part.proofs for j in found.waiting) and (
-            found.waiting_safety is None or part.safety is not None
-        )
-        if decided or len(parked) == 1 or time.monotonic() > self.deadline:
-            return [part]
-        half = len(parked) // 2
-        return [*self._groups(parked[:half], found), *self._groups(parked[half:], found)]
+    def _try_alone(self, found: Findings) -> None:
+        """Go on with a parked flow until it is decided or wants another restart; undo the parking where
+        that breaks down: its part of the starts is too large then."""
+        flow = found.parked[0]
+        part = self._follow([self.continued[id(flow)]], [flow], found, park=True)
+        assert part.last is not None
+        if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
+            why = part.failure or part.unproved or f"at t = {part.last.time:.6g} s the disturbance has filled the reach set"
+            found.parked, found.waiting, found.waiting_safety = [], {}, None
+            found.failure = f"{why}; a smaller start set or disturbance would help"
+            return
+        self.chains[id(flow)] = part
 
-    def _together(self, parked: list[Flow], found: Findings) -> Findings:
-        """Restart parked flows as one, and again as often as it takes."""
-        end = self._end()
-        flows: list[Flow] = []
+    def _follow(self, flows: list[Flow], before: list[Flow], found: Findings, park: bool) -> Findings:
         wanted = list(found.waiting)
         safety = found.waiting_safety is not None
-        following = self._again(parked, end, first=True)
+        tail, reason, parked = self._advance(flows, wanted, safety, self._end(), park=park)
+        part = self._findings(flows, wanted, tail, reason, safety, before=before)
+        if parked and proved_instants(flows[-1]) == len(flows[-1].steps):
+            part.parked = [*before, *flows]
+        return part
+
+    def _groups(self, open_chains: list[Findings], found: Findings) -> list[Findings]:
+        """Chains that want another restart, together, or in halves where all of them are too much."""
+        ends = [part.parked[-1] for part in open_chains]
+        before = [flow for part in open_chains for flow in part.parked]
+        following = self.continued[id(ends[0])] if len(ends) == 1 else self._again(ends, self._end())
         if following is None:
-            return Findings(flow=parked[0], last=parked[-1], failure="the reach set cannot be enclosed again")
-        flows.append(following)
-        tail, reason, _ = self._advance(flows, wanted, safety, end, park=False)
-        return self._findings(flows, wanted, tail, reason, safety, before=parked)
+            part = Findings(flow=ends[0], last=ends[-1], failure="the reach set cannot be enclosed again")
+        else:
+            part = self._follow([following], before, found, park=False)
+        missing = [j for j in found.waiting if j not in part.proofs and any(j not in c.proofs for c in open_chains)]
+        decided = not missing and (found.waiting_safety is None or part.safety is not None)
+        if decided or len(open_chains) == 1 or time.monotonic() > self.deadline:
+            proofs = [together([c.proofs.get(j) for c in open_chains]) for j in found.waiting]
+            for j, proof in zip(found.waiting, proofs, strict=True):
+                if proof is not None:
+                    part.proofs[j] = proof
+            return [part]
+        half = len(open_chains) // 2
+        return [*self._groups(open_chains[:half], found), *self._groups(open_chains[half:], found)]
 
     def _finish(self, found: Findings, parts: Sequence[Findings]) -> None:
         for j, others in found.waiting.items():
@@ -164,6 +190,8 @@ class Exploration:
         """Decide the wanted goals (and the check) on one part, cutting it where that helps."""
         self.parts += 1
         found = self._run(piece, wanted, safety, effort)
+        if found.parked:
+            self._try_alone(found)
         left = [j for j in wanted if j not in found.proofs and j not in found.waiting]
         again, check_again = self._worth_refining(found, left, safety)
         done = not again and not check_again
@@ -239,9 +267,13 @@ class Exploration:
                 break
             taken += 1
             if not self.linear and flow.wants_restart():
-                if park:
-                    return tail, reason, True
-                flow = self._again([flow], end, flows=flows) or flow
+                following = self._again([flow], end, first=len(flows) == 1 and flow.piece.chart.original)
+                if following is not None:
+                    if park:
+                        self.continued[id(flow)] = following
+                        return tail, reason, True
+                    flows.append(following)
+                    flow = following
             if taken < checkpoint and flow.time < end:
                 continue
             checkpoint = int(taken * 1.25) + 4
@@ -263,18 +295,18 @@ class Exploration:
             if settled and all(now[j] > 0.98 * previous[j] for j in pending):
                 if flow.frame is not None or self.framed[0].frame is None:
                     break
-                if park:
-                    return tail, reason, True
-                following = self._again([flow], end, flows=flows)
+                following = self._again([flow], end)
                 if following is None:
                     break
+                if park:
+                    self.continued[id(flow)] = following
+                    return tail, reason, True
+                flows.append(following)
                 flow = following
             previous = {j: now[j] for j in pending}
         return tail, reason, False
 
-    def _again(
-        self, last: Sequence[Flow], end: float, flows: list[Flow] | None = None, first: bool = False
-    ) -> Flow | None:
+    def _again(self, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
         """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
 
         The first holds out longer while the set is large, the second is tighter in the end, and at
@@ -284,12 +316,11 @@ class Exploration:
         flow = last[0]
         framed = not first or mode_gap(flow.slope) > WIDE_GAP
         following = restarted(last, self.framed if framed else self.fields, RESTART_ORDER)
-        if following is None or following.time >= end or not following.advance(end):
-            flow.next_restart = len(flow.steps) + RESTART_STEPS
-            return None
-        if flows is not None:
-            flows.append(following)
-        return following
+        if following is not None and following.time < end and following.advance(end):
+            if proved_instants(following) == len(following.steps):
+                return following
+        flow.next_restart = len(flow.steps) + RESTART_STEPS
+        return None
 
     def _longest_step(self) -> float:
         """A crossing is looked for at the ends of steps only: enough of them within the horizon."""
@@ -345,7 +376,9 @@ class Exploration:
         seen = [Reach(f, self.horizon, goal.reset).earliest(goal.region, self.plant) for f in before]
         earliest = min((t for t in seen if t is not None), default=None)
         # A part that was parked early is ahead of the clock of the common flow.
-        ahead = flows[0].times[0] - min((f.time for f in before), default=flows[0].times[0])
+        ahead = flows[0].times[0] - min((f.time for f in before[-1:] or ()), default=flows[0].times[0])
+        if len(before) > 2:
+            ahead = flows[0].times[0] - min(f.times[0] for f in before)
         for flow in flows:
             reach = Reach(flow, self.horizon, goal.reset)
             if earliest is None:

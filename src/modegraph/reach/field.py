@@ -46,6 +46,8 @@ class Field:
         Constraint name of each face.
     linear : bool
         Jacobian and disturbance matrix are constant.
+    steady : bool
+        The Jacobian is constant.
     full_w : bool
         f is not affine in the disturbance.
     autonomous : bool
@@ -64,6 +66,7 @@ class Field:
     faces: tuple[str, ...]
     outputs: int
     linear: bool
+    steady: bool
     full_w: bool
     autonomous: bool
     reads: tuple[frozenset[int], ...]
@@ -211,7 +214,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         faces = observed[: len(faces)]
     by_x = derivative(rates, states)
     jacobian = [e for row in by_x for e in row] + [e for row in by_w for e in row]
-    roots = [e.index for e in jacobian[: n * (n + nw)]]
+    roots = [e.index for row in (*by_x, *by_w) for e in row]
     linear = all(graph.nodes[k].op == CONST for k in roots)
     return Field(
         start=segment.start,
@@ -226,6 +229,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         faces=tuple(face.name for face in segment.constraints),
         outputs=len(segment.tracking),
         linear=linear and not unique,
+        steady=all(graph.nodes[k].op == CONST for k in roots[: n * n]),
         full_w=bool(nw) and not affine,
         autonomous=not any(e.depends_on([loop.time]) for e in [*rates, *faces, *unique]),
         reads=tuple(frozenset(k for k in range(n) if rate.depends_on([states[k]])) for rate in rates),

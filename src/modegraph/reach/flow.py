@@ -44,9 +44,11 @@ RUNAWAY_STEPS = 10
 """A remainder that doubles over this many steps while they cover little time is given up."""
 DISTURBED_RATE_CAP = 0.2
 """The same with a disturbance: its two columns a step are exact only as h A0 -> 0."""
-RESTART_STEPS, RESTART_FEEDBACK, RESTART_SHARE = 12, 0.1, 0.5
+RESTART_STEPS, RESTART_FEEDBACK, RESTART_SHARE = 12, 0.05, 0.3
 """A disturbed flow is enclosed and started again after this many steps, when the remainder feeds
 itself by this share and is this large relative to the polynomial part."""
+LATE_FEEDBACK = 0.4
+"""The share for flows that were restarted twice: then the set is small, and restarting only widens it."""
 FINE_RATE_CAP = 0.05
 """The same where steps are cheap: linear loops and up to three states."""
 SMALLEST_STEP = 1e-7
@@ -152,6 +154,7 @@ class Flow:
     order : degrees.
     reset : tape of the memory as a function of the plant state, where the piece is on the plant only.
     framed : the piece is given in the coordinates of the fields' frame.
+    generation : how often the starts were enclosed again.
     longest_step : seconds; switching instants are ends of steps, so steps must not be too long.
     t0, energy : seconds and a bound of int u'u at the start, for a flow that continues another.
     """
@@ -171,6 +174,7 @@ class Flow:
         energy: float = 0.0,
         framed: bool = False,
         longest_step: float = np.inf,
+        generation: int = 0,
     ) -> None:
         self.fields = list(fields)
         self.piece = piece
@@ -189,6 +193,7 @@ class Flow:
             self.segment += 1
         self.first_segment = self.segment
         self.longest_step = longest_step
+        self.generation = generation
         self.stops = sorted(s for s in stops if s > t0)
         self.steps: list[Step] = []
         self.h = 0.0
@@ -336,7 +341,7 @@ class Flow:
     def _rate_cap(self, fld: Field) -> float:
         if not self.w_radius.any():
             return RATE_CAP
-        return DISTURBED_RATE_CAP if fld.states > 3 and not fld.linear else FINE_RATE_CAP
+        return DISTURBED_RATE_CAP if fld.states > 3 and not fld.steady else FINE_RATE_CAP
 
     def _runs_away(self, G: Floats) -> bool:
         """Whether the remainder has begun its last growth: it feeds itself while the steps shrink."""
@@ -471,7 +476,8 @@ class Flow:
 
     def wants_restart(self) -> bool:
         """Whether the remainder feeds itself and is as large as the polynomial part."""
-        if not self.w_radius.any() or len(self.steps) < self.next_restart or self.feedback < RESTART_FEEDBACK:
+        least = RESTART_FEEDBACK if self.generation < 2 else LATE_FEEDBACK
+        if not self.w_radius.any() or len(self.steps) < self.next_restart or self.feedback < least:
             return False
         z = generator_box(self._G)
         own = np.abs(self._p[:, 1:]).sum(axis=1)

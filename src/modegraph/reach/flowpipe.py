@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,9 +25,11 @@ Floats = NDArray[np.float64]
 
 LADDER = ((3, 2), (4, 3), (6, 3), (8, 4), (10, 4))
 """Degrees of p and of the Jacobian flow; higher ones are tried where lower ones are loose or break down."""
-LIGHT_MONOMIALS = 130
-"""The first degree tried is the highest with at most so many monomials: up to there it costs nothing."""
-MOST_MONOMIALS, MOST_GENERATOR_MONOMIALS = 1300, 100
+LIGHT_MONOMIALS, MOST_LIGHT = 130, 8
+"""The first degree tried is the highest with at most so many monomials, up to this: they cost nothing."""
+MOST_MONOMIALS, MOST_GENERATOR_MONOMIALS = 500, 100
+MOST_DISTURBED = 6
+"""Highest degree with a disturbance: there the remainder is what the disturbance adds."""
 LOOSE = 5e-3
 """Share of the remainder in the width of the last set above which a higher degree is tried."""
 MOST_PIECES = 32
@@ -245,17 +248,28 @@ def orders(compiled: CompiledMode, variables: int) -> list[Order]:
         return [Order(1, 0)]
     found: list[Order] = []
     for degree, jacobian in LADDER:
+        if found and degree > MOST_DISTURBED and compiled.w_radius.any():
+            break
         count = math.comb(variables + degree, degree)
         if found and count > MOST_MONOMIALS:
             break
         while jacobian > 1 and math.comb(variables + jacobian, jacobian) > MOST_GENERATOR_MONOMIALS:
             jacobian -= 1
         order = Order(degree, jacobian)
-        if count <= LIGHT_MONOMIALS and degree <= 8:
+        if count <= LIGHT_MONOMIALS and degree <= MOST_LIGHT:
             found = [order]
         else:
             found.append(order)
     return found
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A piece with its best chain: which rung of the ladder made it, and the last rung worth trying."""
+
+    chain: Chain
+    rung: int
+    top: int
 
 
 class _Cutting:
@@ -268,36 +282,33 @@ class _Cutting:
 
     def run(self) -> tuple[list[Chain], str]:
         """A chain for each piece, and why cutting ended where it failed."""
-        chains = [self._best(self.compiled.whole(), 0)]
-        while True:
-            failed = [chain for chain in chains if chain.failure]
-            if not failed:
-                return chains, ""
-            worst = min(failed, key=lambda chain: chain.time)
-            if worst.piece.variables == 0:
-                return chains, ""
-            if len(chains) >= MOST_PIECES or worst.piece.depth >= DEEPEST_CUT:
-                return chains, "; no more are tried"
-            halves = worst.piece.split(nonlinear_variable(worst.flows[0]))
-            first = self._rung(worst)
-            parts = [self._best(half, first) for half in halves]
-            if min(part.time for part in parts) <= PROGRESS * worst.time:
-                return chains, "; cutting it gets no further"
-            chains = [chain for chain in chains if chain is not worst] + parts
+        whole = self.compiled.whole()
+        ladder = orders(self.compiled, whole.variables)
+        parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
+        stuck = ""
+        while not stuck and any(part.chain.failure for part in parts):
+            worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
+            piece = worst.chain.piece
+            if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+                stuck = "; no more are tried"
+                break
+            halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
+            children = [self._best(half, ladder, worst.rung, worst.top) for half in halves]
+            if min(child.chain.time for child in children) <= PROGRESS * worst.chain.time:
+                stuck = "; cutting it gets no further"
+                break
+            parts = [part for part in parts if part is not worst] + children
+        return [part.chain for part in parts], stuck
 
-    def _rung(self, chain: Chain) -> int:
-        return orders(self.compiled, chain.piece.variables).index(chain.order)
-
-    def _best(self, piece: Piece, first: int) -> Chain:
+    def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""
-        ladder = orders(self.compiled, piece.variables)
-        best: Chain | None = None
-        for order in ladder[first:]:
-            chain = Chain(self.compiled, self.framed, piece, order)
+        best: _Part | None = None
+        for rung in range(first, top + 1):
+            chain = Chain(self.compiled, self.framed, piece, ladder[rung])
             done = chain.run(self.end)
-            if best is not None and not _further(chain, best):
-                return best
-            best = chain
+            if best is not None and not _further(chain, best.chain):
+                return replace(best, top=best.rung)
+            best = _Part(chain, rung, top)
             if not chain.begun or (done and (self.disturbed or not _loose(chain))):
                 break
         assert best is not None

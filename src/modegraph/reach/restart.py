@@ -1,4 +1,4 @@
-"""Start a flowpipe again from a parallelotope around its end.
+"""Start a flowpipe again from a zonotope around its end.
 
 The set variables are given up for new ones: what was remainder becomes polynomial. Under a
 disturbance the remainder is as large as the set after a while, and only boxes of it feed the
@@ -12,39 +12,37 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..enclosure.rounding import UNIT
+from .bounds import PolynomialBounds
 from .field import Field
 from .flow import Flow, Order
 from .parallelotope import half_widths, principal_axes, tightest
 from .start import Piece
 
+Floats = NDArray[np.float64]
+
 
 def restarted(flows: Sequence[Flow], fields: Sequence[Field], order: Order) -> Flow | None:
-    """A flow that continues ``flows`` from a parallelotope around their ends; None if none is found.
+    """A flow that continues ``flows`` from a zonotope around their ends; None if none is found.
 
-    It starts at the latest of their instants: valid for several only where the loop does not depend
-    on time. ``fields`` may be in another frame than those of the flows.
+    One flow keeps the linear part of its polynomial; several are enclosed together, and start at the
+    latest of their instants: valid only where the loop does not depend on time. ``fields`` may be in
+    another frame than those of the flows.
     """
-    sets = [(flow.bounds, *flow.state_set(len(flow.steps))) for flow in flows]
-    n = len(sets[0][1])
-    hulls = [flow.end_box() for flow in flows]
-    centre = 0.5 * (np.min([lo for lo, _ in hulls], axis=0) + np.max([hi for _, hi in hulls], axis=0))
-    candidates = [np.eye(n), principal_axes(*sets[0])]
-    if fields[0].frame is not None:
-        candidates.append(fields[0].frame.V)
-    found = tightest(sets, candidates, centre)
-    if found is None:
+    enclosed = _around_one(flows[0], fields) if len(flows) == 1 else None
+    if enclosed is None:
+        enclosed = _around_all(flows, fields)
+    if enclosed is None:
         return None
-    axes, widths = found
-    M = axes * (widths * (1.0 + 1e-9))
-    # The products are rounded entry by entry: what counts is that this very M holds the sets.
-    if not all((half_widths(bounds, p, G, M, centre) <= 1.0).all() for bounds, p, G in sets):
-        return None
+    centre, axes = enclosed
     first = flows[0]
-    chart = replace(first.piece.chart, centre=centre, axes=M, round=False, faces=None)
+    chart = replace(first.piece.chart, centre=centre, axes=axes, round=False, faces=None, original=False)
     m = first.piece.chart.free
-    lo = np.concatenate([-np.ones(n), np.min([flow.piece.lo[m:] for flow in flows], axis=0)])
-    hi = np.concatenate([np.ones(n), np.max([flow.piece.hi[m:] for flow in flows], axis=0)])
+    free = axes.shape[1]
+    lo = np.concatenate([-np.ones(free), np.min([flow.piece.lo[m:] for flow in flows], axis=0)])
+    hi = np.concatenate([np.ones(free), np.max([flow.piece.hi[m:] for flow in flows], axis=0)])
     spent = [float(f.seen_bounds.upper(f.steps[-1].energy) + f.steps[-1].energy_radius) for f in flows]
     return Flow(
         fields,
@@ -57,4 +55,50 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], order: Order) -> F
         t0=max(flow.time for flow in flows),
         energy=max(spent),
         longest_step=first.longest_step,
+        generation=first.generation + 1,
     )
+
+
+def _candidates(fields: Sequence[Field], bounds: PolynomialBounds, p: Floats, G: Floats) -> list[Floats]:
+    frame = fields[0].frame
+    return [np.eye(len(p)), principal_axes(bounds, p, G), *([] if frame is None else [frame.V])]
+
+
+def _around_one(flow: Flow, fields: Sequence[Field]) -> tuple[Floats, Floats] | None:
+    """Centre and axes: the linear part of p as it is, and a parallelotope around all the rest."""
+    p, G = flow.state_set(len(flow.steps))
+    n, free = len(p), flow.piece.chart.free
+    linear = flow.bounds.linear_part(p)
+    if not 0 < free <= n:
+        return None
+    below, above = flow.bounds.nonlinear_radius(p)
+    middle = 0.5 * (below + above)
+    centre = p[:, 0] + middle
+    rest = 0.5 * (above - below) + np.abs(linear[:, free:]).sum(axis=1)
+    rest = rest * (1.0 + 1e-12) + 8.0 * UNIT * (np.abs(centre) + np.abs(middle))
+    box = np.zeros((n, n, G.shape[2]))
+    box[np.arange(n), np.arange(n), 0] = rest
+    every = np.concatenate([G, box])
+    nothing, origin = np.zeros_like(p), np.zeros(n)
+    found = tightest([(flow.bounds, nothing, every)], _candidates(fields, flow.bounds, nothing, every), origin)
+    if found is None:
+        return None
+    M = found[0] * (found[1] * (1.0 + 1e-9))
+    # The products are rounded entry by entry: what counts is that this very M holds the rest.
+    if not (half_widths(flow.bounds, nothing, every, M, origin) <= 1.0).all():
+        return None
+    return centre, np.hstack([linear[:, :free], M])
+
+
+def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> tuple[Floats, Floats] | None:
+    """Centre and axes of one parallelotope around the ends of all flows."""
+    sets = [(flow.bounds, *flow.state_set(len(flow.steps))) for flow in flows]
+    hulls = [flow.end_box() for flow in flows]
+    centre = 0.5 * (np.min([lo for lo, _ in hulls], axis=0) + np.max([hi for _, hi in hulls], axis=0))
+    found = tightest(sets, _candidates(fields, *sets[0]), centre)
+    if found is None:
+        return None
+    M = found[0] * (found[1] * (1.0 + 1e-9))
+    if not all((half_widths(bounds, p, G, M, centre) <= 1.0).all() for bounds, p, G in sets):
+        return None
+    return centre, M

@@ -39,6 +39,8 @@ class Chart:
     faces: tuple[Floats, Floats] | None
     unknown_lo: Floats
     unknown_hi: Floats
+    original: bool = True
+    """The starts themselves, not a later reach set."""
 
     @property
     def free(self) -> int:
