@@ -389,7 +389,7 @@ class Exploration:
                 first = max(0.0, min(c.time for c in outcome) - ahead)
                 latest = max(c.instant for c in outcome)
                 return SwitchProof(
-                    earliest=first if earliest is None else min(earliest, first),
+                    earliest=float(first if earliest is None else min(earliest, first)),
                     latest=max(c.time for c in outcome),
                     margin=min(1.0 - c.best for c in outcome),
                     window=min(c.window for c in outcome),

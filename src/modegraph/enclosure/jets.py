@@ -33,6 +33,12 @@ from .elementary import taylor_coefficients
 from .polynomial import KERNEL, compose_into, multiply_into
 
 
+PLAIN = 1.0
+TOO_WIDE = 2.0
+"""Marks of an elementary function (1/a, exp, log, atan): stored as a constant; to be stored so at the next
+try, because its argument ranges too widely for a Taylor polynomial."""
+
+
 @njit(**KERNEL)
 def constant_radius(c, deg, start):
     """Sum of the absolute coefficients except the constant one."""
@@ -46,7 +52,8 @@ def constant_radius(c, deg, start):
 def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, product, offset, start, degree):
     """Set P[q, j] and its degree dg[q, j] from lower coefficients, truncated at degree dmax.
 
-    kinks[q] = (alpha, beta): relu(a) is stored as alpha a + beta, step(a) as the constant alpha.
+    kinks[q] = (alpha, beta): relu(a) is stored as alpha a + beta, step(a) as the constant alpha; an
+    elementary function with alpha = PLAIN as the constant beta.
     """
     op = ops[q, 0]
     a = ops[q, 1]
@@ -63,6 +70,12 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             dg[q, 0] = 0
         return
     d = -1
+    if op >= RECIP and op <= ATAN and kinks[q, 0] == PLAIN:
+        dg[q, j] = -1
+        if j == 0 and kinks[q, 1] != 0.0:
+            c[0] = kinks[q, 1]
+            dg[q, 0] = 0
+        return
     if op == ADD or op == SUB:
         da = min(dg[a, j], dmax)
         db = min(dg[b, j], dmax)
@@ -168,10 +181,12 @@ def propose_kinks(ops, P, dg, ranges, kinks, start):
     """Choose the stored form of relu and step nodes from the ranges [lo, hi] of their arguments."""
     for q in range(ops.shape[0]):
         op = ops[q, 0]
-        if op != RELU and op != STEP:
-            continue
         lo = ranges[q, 0]
         hi = ranges[q, 1]
+        if op >= RECIP and op <= ATAN:
+            kinks[q, 0] = PLAIN if lo <= hi and kinks[q, 0] >= PLAIN else 0.0
+        if op != RELU and op != STEP:
+            continue
         if not (lo <= hi):
             # Not known yet: decided from the argument when it is first computed.
             kinks[q, 0] = math.nan

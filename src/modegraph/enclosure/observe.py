@@ -7,7 +7,7 @@ from numba import njit
 
 from .jets import solve_in_time
 from .polynomial import KERNEL
-from .remainder import coefficient_norms, remainders
+from .remainder import coefficient_norms, remainders, wants_another_try
 from .rounding import TINY, UNIT, UP
 from .step import truncate_inputs
 from .variational import chord_distance
@@ -43,11 +43,7 @@ def observe_step(
         remainders(
             ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree
         )
-        crossing = False
-        for r in range(ops.shape[0]):
-            if ranges[r, 0] < 0.0 < ranges[r, 1]:
-                crossing = True
-        if not crossing:
+        if not wants_another_try(ops, kinks, ranges):
             break
     ends = np.zeros((3, count, Nq))
     slack = np.zeros((count, 2))
@@ -111,11 +107,7 @@ def enclose_at(
         bad = remainders(
             ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, 0, cut, pairs, product, offset, start, degree
         )
-        crossing = False
-        for r in range(ops.shape[0]):
-            if ranges[r, 0] < 0.0 < ranges[r, 1]:
-                crossing = True
-        if not crossing:
+        if not wants_another_try(ops, kinks, ranges):
             break
     out = np.zeros((count, p.shape[1]))
     size = np.zeros(count)

@@ -32,6 +32,7 @@ from ..expression.ops import (
     WHERE,
 )
 from .elementary import taylor_coefficients, taylor_errors
+from .jets import PLAIN, TOO_WIDE
 from .polynomial import KERNEL, multiply_into
 from .rounding import LIBM, TINY, UNIT, UP
 
@@ -158,6 +159,19 @@ def remainders(
         if op == CONST:
             R[q] = const_rad[q]
             continue
+        if op >= RECIP and op <= ATAN:
+            rest = (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0))) * UP + R[a] * UP
+            rest += 4.0 * UNIT * (abs(P[a, 0, 0]) + rest)
+            ranges[q, 0] = P[a, 0, 0] - rest
+            ranges[q, 1] = P[a, 0, 0] + rest
+            low, high = image(op, ranges[q, 0], ranges[q, 1])
+            if kinks[q, 0] == PLAIN:
+                R[q] = max(abs(high - kinks[q, 1]), abs(low - kinks[q, 1])) * UP + TINY
+                if not R[q] < np.inf:
+                    R[q] = np.inf
+                    if bad < 0:
+                        bad = q
+                continue
         if op == ADD or op == SUB:
             r = R[a] + R[b] + 2.0 * UNIT * (A[a] + A[b])
             for j in range(K + 1):
@@ -285,8 +299,48 @@ def remainders(
                 for j in range(K + 1):
                     r += tails[branch, j, min(cut[j] + 1, n + 1)]
                 R[q] = (R[branch] + r) * UP if (lo > 0.0 or hi < 0.0) else np.inf
+        if op >= RECIP and op <= ATAN and high - low < np.inf and not R[q] < high - low:
+            kinks[q, 0] = TOO_WIDE
+            kinks[q, 1] = 0.5 * (low + high)
         if not R[q] < np.inf:
             R[q] = np.inf
             if bad < 0:
                 bad = q
     return bad
+
+
+@njit(**KERNEL)
+def image(op, lo, hi):
+    """Range of 1/a, exp a, log a or atan a for a in [lo, hi], rounded outward; infinite where undefined."""
+    if not lo <= hi:
+        return -np.inf, np.inf
+    if op == RECIP:
+        if not (lo > 0.0 or hi < 0.0):
+            return -np.inf, np.inf
+        low = 1.0 / hi
+        high = 1.0 / lo
+    elif op == EXP:
+        low = math.exp(lo)
+        high = math.exp(hi)
+    elif op == LOG:
+        if not lo > 0.0:
+            return -np.inf, np.inf
+        low = math.log(lo)
+        high = math.log(hi)
+    else:
+        low = math.atan(lo)
+        high = math.atan(hi)
+    return low - 2.0 * LIBM * abs(low) - TINY, high + 2.0 * LIBM * abs(high) + TINY
+
+
+@njit(**KERNEL)
+def wants_another_try(ops, kinks, ranges):
+    """Whether a kink is crossed, or a function ranges too widely: then its range is known now, and the
+    stored polynomials can be chosen better."""
+    for q in range(ops.shape[0]):
+        op = ops[q, 0]
+        if (op == RELU or op == STEP) and ranges[q, 0] < 0.0 < ranges[q, 1]:
+            return True
+        if op >= RECIP and op <= ATAN and kinks[q, 0] == TOO_WIDE:
+            return True
+    return False

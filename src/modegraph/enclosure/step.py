@@ -12,7 +12,7 @@ from numba import njit
 
 from .jets import solve_in_time
 from .polynomial import KERNEL
-from .remainder import coefficient_norms, remainders
+from .remainder import coefficient_norms, remainders, wants_another_try
 from .rounding import TINY, UNIT, UP
 from .variational import (
     advance_generators,
@@ -82,11 +82,7 @@ def taylor_step(
             ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start,
             degree,
         )  # fmt: skip
-        crossing = False
-        for q in range(ops.shape[0]):
-            if ranges[q, 0] < 0.0 < ranges[q, 1]:
-                crossing = True
-        if not crossing:
+        if not wants_another_try(ops, kinks, ranges):
             break
     defect = np.zeros(n)
     in_time = np.zeros(n)

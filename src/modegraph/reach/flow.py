@@ -51,6 +51,8 @@ LATE_FEEDBACK = 0.4
 """The share for flows that were restarted twice: then the set is small, and restarting only widens it."""
 FINE_RATE_CAP = 0.05
 """The same where steps are cheap: linear loops and up to three states."""
+SHORTER_LOOKS = 4
+"""How often a step is cut to a quarter because a constraint cannot be proved between its ends."""
 SMALLEST_STEP = 1e-7
 """A flowpipe stops when its step falls below this part of the time scale of the loop."""
 
@@ -303,6 +305,7 @@ class Flow:
             self.h = self._first_step()
         stop = min([limit, fld.end, *(s for s in self.stops if s > self.time)][:3])
         h_try = min(self.h, self.longest_step)
+        shortened = 0
         for _ in range(60):
             t1 = next_instant(self.time, h_try, stop)
             h = t1 - self.time
@@ -321,6 +324,13 @@ class Flow:
                     h_try = h * caps
                     continue
                 factor = min(factor, caps)
+                seen = self._observe(fld, h, tube)
+                if shortened < SHORTER_LOOKS and not (seen[0] <= 0.0).all() and h > 1e-6:
+                    # Between the ends a constraint is bounded through its bend: try a shorter look.
+                    if (self.faces_at(t1, p, G, self.segment) <= 0.0).all():
+                        shortened += 1
+                        h_try = 0.25 * h
+                        continue
                 self.h = h * max(0.1, factor) if h > 0.5 * h_try else h_try
                 break
             h_try = 0.4 * h
@@ -332,7 +342,7 @@ class Flow:
             return False
         self.feedback = float(control[4])
         self._ybox = rest
-        self._record(fld, t1, p, G, tube, bend)
+        self._record(fld, t1, p, G, tube, bend, seen)
         if not np.isfinite(p).all() or self._runs_away(G):
             self._fail(fld, NO_CONTRACTION, 0)
             return False
@@ -383,8 +393,17 @@ class Flow:
             self._errors.variables,
         )  # fmt: skip
 
-    def _record(self, fld: Field, t1: float, p: Floats, G: Floats, tube: Floats, bend: Floats) -> None:
-        face_upper, mean, mean_radius, tracking = self._observe(fld, t1 - self.time, tube)
+    def _record(
+        self,
+        fld: Field,
+        t1: float,
+        p: Floats,
+        G: Floats,
+        tube: Floats,
+        bend: Floats,
+        seen: tuple[Floats, Floats, float, Floats],
+    ) -> None:
+        face_upper, mean, mean_radius, tracking = seen
         h = t1 - self.time
         self._energy = self._energy + h * mean
         rounding = 4.0 * UNIT * float(np.abs(self._energy).sum() + h * np.abs(mean).sum())
