@@ -27,12 +27,8 @@ class Anchor:
     others: str
 
 
-VDP = Anchor(
-    "VDP, T = 7", ("x", "y"), (0.104, 0.436), (0.150, 0.599), 1.8, "immrax 6.7e3 or NaN; CAPD ends at 2.1"
-)
-LALO = Anchor(
-    "LALO W = .01, T = 20", ("x4",), (0.0025,), (0.0032,), 3.9, "kv .0037 in 2.6 s; immrax 15.5; CAPD fails"
-)
+VDP = Anchor("VDP, T = 7", ("x", "y"), (0.104, 0.436), (0.150, 0.599), 1.8, "immrax 6.7e3 or NaN; CAPD ends at 2.1")
+LALO = Anchor("LALO W = .01, T = 20", ("x4",), (0.0025,), (0.0032,), 3.9, "kv .0037 in 2.6 s; immrax 15.5; CAPD fails")
 ARM_0 = Anchor(
     "ARM-0, T = 3",
     ("q1", "q2"),

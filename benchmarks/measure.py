@@ -54,10 +54,7 @@ def build(example: str, *, cold: bool = False) -> dict[str, Any]:
 def import_seconds() -> float:
     """Best of five, without the start of Python itself."""
     code = "import time; t = time.perf_counter(); import modegraph; print(time.perf_counter() - t)"
-    runs = [
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        for _ in range(5)
-    ]
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(5)]
     return min(float(run.stdout) for run in runs)
 
 

@@ -16,9 +16,7 @@ import modegraph as mg
 
 STATIONS = [[0.0], [0.6], [1.2], [1.8]]  # positions to hold, m
 
-plant = mg.System(
-    lambda x, u: np.array([x[1], u[0]]), states="position speed", inputs="force", name="point mass"
-)
+plant = mg.System(lambda x, u: np.array([x[1], u[0]]), states="position speed", inputs="force", name="point mass")
 
 
 def pole_placement(poles):

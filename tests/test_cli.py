@@ -97,9 +97,7 @@ def test_build_json(model: str) -> None:
     assert data["switches"][0]["references"] == [[[0.0], [0.0]], [[0.0], [1.0]]]
 
 
-@pytest.mark.parametrize(
-    ("status", "code"), [(Status.CERTIFIED, 0), (Status.REFUTED, 1), (Status.UNDECIDED, 3)]
-)
+@pytest.mark.parametrize(("status", "code"), [(Status.CERTIFIED, 0), (Status.REFUTED, 1), (Status.UNDECIDED, 3)])
 def test_check_exit_codes(model: str, engine: Any, status: Status, code: int) -> None:
     engine["fast"] = Verdict(status, "because")
     result = run("check", model)
@@ -258,9 +256,7 @@ def test_the_shipped_examples_are_found() -> None:
     assert "did you mean 'arm'" in wrong(run("demo", "arn"))
 
 
-def test_examples_installed_with_the_package_come_first(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_examples_installed_with_the_package_come_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "site" / "modegraph"
     for folder in (package / "examples", tmp_path / "examples"):
         folder.mkdir(parents=True)

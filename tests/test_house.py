@@ -54,9 +54,7 @@ def test_files_are_short_and_well_named(path: Path) -> None:
 
 
 def test_numba_lives_in_enclosure_only() -> None:
-    users = {
-        p.relative_to(SOURCE).parts[0] for p in MODULES if re.search(r"(import|from) numba", p.read_text())
-    }
+    users = {p.relative_to(SOURCE).parts[0] for p in MODULES if re.search(r"(import|from) numba", p.read_text())}
     assert users <= {"enclosure"}
 
 
@@ -69,9 +67,9 @@ def test_import_is_fast_and_light() -> None:
     best = 9.0
     for _ in range(3):
         begin = time.perf_counter()
-        out = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout.split("\n")
+        out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split(
+            "\n"
+        )
         best = min(best, float(out[0]), time.perf_counter() - begin)
         assert out[1] == "[]"
     assert best < 0.5
@@ -79,7 +77,5 @@ def test_import_is_fast_and_light() -> None:
 
 def test_examples_ship_with_the_package() -> None:
     config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert config["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {
-        "examples": "modegraph/examples"
-    }
+    assert config["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"examples": "modegraph/examples"}
     assert config["project"]["version"] == modegraph.__version__

@@ -35,18 +35,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON; keys are the att
 Budget = Annotated[float | None, typer.Option(help="Seconds of work for the proofs.")]
 From = Annotated[str | None, typer.Option("--from", metavar="MODE", help="The mode that runs at first.")]
 To = Annotated[str | None, typer.Option("--to", metavar="MODE", help="The mode or target to end in.")]
-Minimize = Annotated[
-    str | None, typer.Option(help="switches, time, energy, margin, or weights: time=1,switches=0.5")
-]
+Minimize = Annotated[str | None, typer.Option(help="switches, time, energy, margin, or weights: time=1,switches=0.5")]
 Via = Annotated[str | None, typer.Option(metavar="MODE,...", help="Visit these, in this order.")]
 Avoid = Annotated[str | None, typer.Option(metavar="MODE,...", help="Never enter these.")]
 MaxSwitches = Annotated[int | None, typer.Option(help="At most so many switches.")]
 RStart = Annotated[str | None, typer.Option(metavar="NUMBERS", help="Reference of the first mode: 0.1,2")]
 RGoal = Annotated[str | None, typer.Option(metavar="NUMBERS", help="Reference of the last mode.")]
 Task = Annotated[str | None, typer.Option(help="An entry of the model's `tasks`; options override it.")]
-StartState = Annotated[
-    str | None, typer.Option("--start", metavar="NUMBERS", help="The state x0: 0.1,0.2,0,0")
-]
+StartState = Annotated[str | None, typer.Option("--start", metavar="NUMBERS", help="The state x0: 0.1,0.2,0,0")]
 
 P = ParamSpec("P")
 

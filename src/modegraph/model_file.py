@@ -47,14 +47,10 @@ class ModelFile:
     def task(self, name: str) -> dict[str, Any]:
         """The arguments of ``plan`` under this name in ``tasks``."""
         if name not in self.tasks:
-            raise ModegraphError(
-                f"{self.path.name} has no task {name!r}; {_hint(name, list(self.tasks), 'tasks')}"
-            )
+            raise ModegraphError(f"{self.path.name} has no task {name!r}; {_hint(name, list(self.tasks), 'tasks')}")
         task = self.tasks[name]
         if not isinstance(task, Mapping):
-            raise ModegraphError(
-                f"{self.path.name}: tasks[{name!r}] must be a dict such as dict(start=, goal=)"
-            )
+            raise ModegraphError(f"{self.path.name}: tasks[{name!r}] must be a dict such as dict(start=, goal=)")
         allowed = ("start", "goal", "minimize", "r_start", "r_goal", "x0", "via", "avoid", "max_switches")
         for key in task:
             if key not in allowed:
@@ -95,9 +91,7 @@ def load_model(path: Path) -> ModelFile:
         raise ModegraphError(f"{path} is not a file; give a Python file that defines `modes`")
     module = _run(path)
     if not hasattr(module, "modes"):
-        raise ModegraphError(
-            f"{path} is no model: it does not define `modes`, a list of modegraph.Mode and Target"
-        )
+        raise ModegraphError(f"{path} is no model: it does not define `modes`, a list of modegraph.Mode and Target")
     try:
         modes = list(module.modes)
     except TypeError:

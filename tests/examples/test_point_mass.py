@@ -26,9 +26,7 @@ def graph(module: Any) -> Any:
 def test_overshoot_constant_bounds_the_norm_closely(module: Any, poles: tuple[complex, complex]) -> None:
     k1, k2 = module.pole_placement(poles)
     A = np.array([[0.0, 1.0], [-k1, -k2]])
-    assert np.allclose(
-        np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.array(poles, complex)), atol=1e-6
-    )
+    assert np.allclose(np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.array(poles, complex)), atol=1e-6)
     worst = max(np.linalg.norm(expm(A * t), 2) for t in np.linspace(0, 8, 2503))
     assert worst <= module.overshoot_constant(k1, k2) <= 1.01 * worst
 

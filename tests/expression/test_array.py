@@ -189,9 +189,7 @@ BINARY = (np.add, np.subtract, np.multiply, np.maximum, np.minimum, lambda a, b:
 @given(st.data())
 @settings(max_examples=60, deadline=None)
 def test_random_programs(data: st.DataObject) -> None:
-    steps = data.draw(
-        st.lists(st.tuples(st.integers(0, 15), st.integers(0, 99), st.integers(0, 99)), max_size=14)
-    )
+    steps = data.draw(st.lists(st.tuples(st.integers(0, 15), st.integers(0, 99), st.integers(0, 99)), max_size=14))
 
     def program(x: Any) -> Any:
         values = [x[0], x[1], x[2], 0.5]

@@ -78,9 +78,7 @@ def test_three_links_collapse() -> None:
         inertia = np.array(
             [[a + 2 * d * c2 + 2 * e * c3 + 2 * f * c23, m01, m02], [m01, b + 2 * e * c3, m12], [m02, m12, c]]
         )
-        bias = np.array(
-            [-(d * s2 + f * s23) * qd[1] ** 2, (d * s2 + f * s23) * qd[0] ** 2, e * s3 * qd[0] * qd[1]]
-        )
+        bias = np.array([-(d * s2 + f * s23) * qd[1] ** 2, (d * s2 + f * s23) * qd[0] ** 2, e * s3 * qd[0] * qd[1]])
         gravity = 9.81 * np.array([np.cos(q[0]), np.cos(q[0] + q[1]), np.cos(q[0] + q[1] + q[2])])
         v = -16 * (q - np.array([1.0, 0.5, 0.3])) - 8 * qd
         u = inertia @ v + bias + gravity
@@ -179,9 +177,7 @@ def test_empty() -> None:
     assert simplify([]).exprs == []
 
 
-STEPS = st.lists(
-    st.tuples(st.integers(0, 8), st.integers(0, 99), st.integers(0, 99)), min_size=3, max_size=16
-)
+STEPS = st.lists(st.tuples(st.integers(0, 8), st.integers(0, 99), st.integers(0, 99)), min_size=3, max_size=16)
 
 
 @given(STEPS)

@@ -40,13 +40,9 @@ def test_units_targets_and_their_place_in_the_graph(engine: Engine) -> None:
     asked = []
 
     def fake(mode: Any, p: Any, targets: Any, *, horizon: Any, deadline: float, progress: Any) -> UnitResult:
-        asked.append(
-            (mode.name, float(p[0]), [(t.name, None if t.p is None else float(t.p[0])) for t in targets])
-        )
+        asked.append((mode.name, float(p[0]), [(t.name, None if t.p is None else float(t.p[0])) for t in targets]))
         assert deadline > time.monotonic()
-        verdicts = [
-            Verdict(Status.UNDECIDED, f"{mode.name}{p} to {t.name}{t.p}", horizon=horizon) for t in targets
-        ]
+        verdicts = [Verdict(Status.UNDECIDED, f"{mode.name}{p} to {t.name}{t.p}", horizon=horizon) for t in targets]
         return UnitResult(verdicts=verdicts, check=Verdict(Status.CERTIFIED, f"check {mode.name}{p}"))
 
     engine(fake)
@@ -71,9 +67,7 @@ def test_horizon_of_the_mode_overrides_that_of_build(engine: Engine) -> None:
         return everything(mode, p, targets)
 
     engine(fake)
-    own = Mode(
-        "own", PLANT, controller=lambda x: -x, reference=setpoint([0.0]), start=Box([0], [1]), horizon=2.0
-    )
+    own = Mode("own", PLANT, controller=lambda x: -x, reference=setpoint([0.0]), start=Box([0], [1]), horizon=2.0)
     build([own, mode("a")], horizon=7.0)
     assert seen == {"own": 2.0, "a": 7.0}
     build([mode("a")])

@@ -113,9 +113,7 @@ def test_explain_tells_reason_figures_and_counterexample() -> None:
     g = graph(
         "ab",
         {
-            ("a", "b"): Verdict(
-                Status.REFUTED, "never arrives [really]", margin=-0.5, witness=witness, horizon=9.0
-            ),
+            ("a", "b"): Verdict(Status.REFUTED, "never arrives [really]", margin=-0.5, witness=witness, horizon=9.0),
             ("b", "a"): certified(2.0, slack={"speed": 0.25}, window=1.0),
         },
     )

@@ -73,9 +73,6 @@ def test_submode_paths_and_compositions_of_the_relations_agree(certain: set) -> 
             if (x[0], y[0], z[0]) == (i, j, k)
         )
         path = any(
-            (b, c) in stay
-            for a, b in switch
-            for c, d in switch
-            if (a.mode, b.mode, c.mode, d.mode) == (i, j, j, k)
+            (b, c) in stay for a, b in switch for c, d in switch if (a.mode, b.mode, c.mode, d.mode) == (i, j, j, k)
         )
         assert path == composed

@@ -120,9 +120,7 @@ def test_parts_of_a_reference_keep_their_derivatives():
         lambda x, r: r[1:].dot + r[:1].ddot,
         reference=mg.trajectory(lambda t: np.array([t**2, t**3]), 1.0),
     )
-    assert evaluate(close_loop(mode), close_loop(mode).segments[0].inputs, [0, 0], 0.5) == pytest.approx(
-        [2.75]
-    )
+    assert evaluate(close_loop(mode), close_loop(mode).segments[0].inputs, [0, 0], 0.5) == pytest.approx([2.75])
 
 
 def test_the_controller_may_switch_in_time_by_itself():
@@ -198,9 +196,7 @@ def two_link_arm(reference):
         q, v = x[:2], x[2:]
         return mass(q) @ (r.ddot - 4 * (v - r.dot) - 4 * (q - r)) + coriolis(q, v) @ v
 
-    plant = mg.System(
-        dynamics, states="q1 q2 v1 v2", inputs=2, disturbance=mg.Box([-0.2, -0.05], [0.2, 0.05])
-    )
+    plant = mg.System(dynamics, states="q1 q2 v1 v2", inputs=2, disturbance=mg.Box([-0.2, -0.05], [0.2, 0.05]))
     return make(
         controller,
         system=plant,

@@ -38,9 +38,7 @@ def test_points():
     assert reference.value(0.0, [1, 0]).tolist() == [1.0, 0.0]
     with pytest.raises(ModegraphError, match="3 references; name one of them"):
         reference.match(None)
-    with pytest.raises(
-        ModegraphError, match=r"\(0.1, 0.3\) names no reference; there is: \(0, 0\), \(1, 0\)"
-    ):
+    with pytest.raises(ModegraphError, match=r"\(0.1, 0.3\) names no reference; there is: \(0, 0\), \(1, 0\)"):
         reference.match([0.1, 0.3])
     with pytest.raises(ModegraphError, match="names no reference"):
         reference.match([np.nextafter(0.1, 1), 0.2])

@@ -13,9 +13,7 @@ def traced(function):
 
 
 def test_affine_conditions_are_found():
-    exprs, t = traced(
-        lambda x, t: np.where(t < 0.5, x, -x) + np.where(2 * t - 3 > 0, 1.0, 0.0) + np.maximum(t, 4.0)
-    )
+    exprs, t = traced(lambda x, t: np.where(t < 0.5, x, -x) + np.where(2 * t - 3 > 0, 1.0, 0.0) + np.maximum(t, 4.0))
     assert switching_times(exprs, t, 0.0, np.inf) == [0.5, 1.5, 4.0]
     assert switching_times(exprs, t, 0.5, 4.0) == [1.5]
     assert len(jumps(exprs, t)) == 2

@@ -66,9 +66,7 @@ def test_the_plant_is_named():
 
 
 def mode_of(plant, controller=lambda x: -x[:1]):
-    return mg.Mode(
-        "m", plant, controller=controller, reference=mg.setpoint(0), start=mg.Box([-1, -1], [1, 1])
-    )
+    return mg.Mode("m", plant, controller=controller, reference=mg.setpoint(0), start=mg.Box([-1, -1], [1, 1]))
 
 
 def rates(plant):
@@ -114,7 +112,5 @@ def test_affine_errors():
     with pytest.raises(ModegraphError, match="args"):
         mg.System.affine(lambda *args: args, lambda x: x, states=2, inputs=1)
     wrong = mg.System.affine(lambda x: x, lambda x: np.eye(2), states=2, inputs=1)
-    with pytest.raises(
-        ModegraphError, match=r"mode 'm', dynamics.*g returned shape \(2, 2\), expected \(2, 1\)"
-    ):
+    with pytest.raises(ModegraphError, match=r"mode 'm', dynamics.*g returned shape \(2, 2\), expected \(2, 1\)"):
         close_loop(mode_of(wrong))

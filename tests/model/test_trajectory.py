@@ -71,9 +71,7 @@ def test_the_held_value_is_exact():
 def test_pieces_of_a_continuous_where_are_polynomials():
     graph = Graph()
     signal = lambda t: np.where(t < 1.0, t**2, 2.0 * t - 1.0)
-    pieces = mg.trajectory(signal, 2.0, breakpoints=[1.0]).pieces(
-        graph, graph.variable("t"), None, "mode 'm'"
-    )
+    pieces = mg.trajectory(signal, 2.0, breakpoints=[1.0]).pieces(graph, graph.variable("t"), None, "mode 'm'")
     assert [piece.value[0].text() for piece in pieces] == ["t**2", "2*t - 1", "3"]
     assert [piece.ddot[0].text() for piece in pieces] == ["2", "0", "0"]
 

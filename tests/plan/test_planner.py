@@ -71,9 +71,7 @@ def test_ties_fewer_switches_then_latest_time_then_mode_order() -> None:
 
 
 def test_start_is_goal() -> None:
-    g = graph(
-        [mode("a", 2), "b"], {("a", "a"): certified(2.0), ("a", "b"): certified(), ("b", "a"): certified()}
-    )
+    g = graph([mode("a", 2), "b"], {("a", "a"): certified(2.0), ("a", "b"): certified(), ("b", "a"): certified()})
     stay = g.plan("a", "a", minimize="time")
     assert stay.modes == ["a"]
     assert stay.cost == 0
@@ -158,9 +156,7 @@ def test_from_a_state() -> None:
 
 
 def test_targets_are_entered_and_never_left() -> None:
-    g = graph(
-        ["a", "b", Target("dock", Box([-0.1], [0.1]))], {("a", "b"): certified(), ("b", "dock"): certified()}
-    )
+    g = graph(["a", "b", Target("dock", Box([-0.1], [0.1]))], {("a", "b"): certified(), ("b", "dock"): certified()})
     plan = g.plan("a", "dock")
     assert plan.modes == ["a", "b", "dock"]
     assert plan.warnings == ()
@@ -213,9 +209,7 @@ def test_energy_bounds_that_are_missing_come_last_and_are_told() -> None:
 
 
 def test_only_certified_pairs_are_used() -> None:
-    g = graph(
-        "abc", {("a", "b"): UNDECIDED, ("b", "c"): certified(), ("a", "c"): Verdict(Status.REFUTED, "no")}
-    )
+    g = graph("abc", {("a", "b"): UNDECIDED, ("b", "c"): certified(), ("a", "c"): Verdict(Status.REFUTED, "no")})
     with pytest.raises(Unreachable) as caught:
         g.plan("a", "c")
     assert caught.value.reachable == ("a",)

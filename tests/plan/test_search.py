@@ -32,9 +32,7 @@ def problems(draw: Any) -> Problem:
         order={node: (MODES.index(node[0]), node[1]) for node in every},
         arcs=arcs,
         starts=tuple(sorted(draw(st.sets(st.tuples(st.sampled_from("ab"), st.integers(0, 1)), min_size=1)))),
-        goals=frozenset(
-            draw(st.sets(st.tuples(st.sampled_from("cd"), st.integers(0, 1)), min_size=1, max_size=2))
-        ),
+        goals=frozenset(draw(st.sets(st.tuples(st.sampled_from("cd"), st.integers(0, 1)), min_size=1, max_size=2))),
         via=draw(st.sampled_from([(), (), (), ("b",), ("c", "a"), ("d",)])),
         avoid=draw(st.sampled_from([frozenset()] * 3 + [frozenset("b")])),
         max_switches=draw(st.sampled_from([None, None, None, 1, 2, 3, 4])),
@@ -107,11 +105,7 @@ def test_a_wide_prefix_does_not_hide_a_shorter_one_behind_a_later_bottleneck() -
 def test_a_dense_graph_is_searched_quickly(size: int) -> None:
     every = [(f"m{k}", 0) for k in range(size)]
     arcs = {
-        s: [
-            Arc(s, t, (0, Fraction(1)), Fraction((7 * i + 3 * j) % 11), 0.5)
-            for j, t in enumerate(every)
-            if s != t
-        ]
+        s: [Arc(s, t, (0, Fraction(1)), Fraction((7 * i + 3 * j) % 11), 0.5) for j, t in enumerate(every) if s != t]
         for i, s in enumerate(every)
     }
     problem = Problem({n: (k, 0) for k, n in enumerate(every)}, arcs, (every[0],), frozenset([every[-1]]))

@@ -54,9 +54,7 @@ def test_helpful_is_what_brute_force_finds(table: dict[Any, Verdict], question: 
         graph("abcde", table).plan("a", "e", **question)
     if question.get("via"):
         assert bool(caught.value.helpful) == bool(expected)
-        assert reaches({**table, **dict.fromkeys(caught.value.helpful, certified())}, question) == bool(
-            expected
-        )
+        assert reaches({**table, **dict.fromkeys(caught.value.helpful, certified())}, question) == bool(expected)
     else:
         assert set(caught.value.helpful) == expected
 

@@ -229,9 +229,7 @@ def test_memory_follows_the_states() -> None:
     np.testing.assert_allclose(box.lo, [0.2, 0.1], atol=1e-12)
     np.testing.assert_allclose(box.hi, [0.4, 0.2], atol=1e-12)
     assert pipe.states == ("x", "z")
-    both = mg.flowpipe(
-        integrating(lambda x: 0.5 * x, mg.Box([0.2], [0.4])), horizon=1.0, start=mg.Box([0, 0], [1, 1])
-    )
+    both = mg.flowpipe(integrating(lambda x: 0.5 * x, mg.Box([0.2], [0.4])), horizon=1.0, start=mg.Box([0, 0], [1, 1]))
     np.testing.assert_allclose(both.at(0.0).hi, [1.0, 1.0], atol=1e-12)
 
 

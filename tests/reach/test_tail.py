@@ -13,9 +13,7 @@ from modegraph.certify.unit import compile_mode
 from modegraph.reach.tail import relevant_states
 
 
-def mode(
-    dynamics: Callable[..., Any], start: mg.Box, controller: Callable[..., Any] | None = None
-) -> mg.Mode:
+def mode(dynamics: Callable[..., Any], start: mg.Box, controller: Callable[..., Any] | None = None) -> mg.Mode:
     plant = mg.System(dynamics, states=start.dim, inputs=1)
     return mg.Mode(
         "m",
@@ -76,9 +74,7 @@ def test_a_cancelled_pole_in_time() -> None:
     assert check(source).status is not mg.Status.CERTIFIED
 
 
-@pytest.mark.parametrize(
-    "rate", [lambda x: x[0], lambda x: np.sin(x[2]) * x[0], lambda x: 1.0 / (2.0 + x[0])]
-)
+@pytest.mark.parametrize("rate", [lambda x: x[0], lambda x: np.sin(x[2]) * x[0], lambda x: 1.0 / (2.0 + x[0])])
 def test_a_drifting_state_that_is_defined_everywhere_is_no_obstacle(rate: Callable[[Any], Any]) -> None:
     source = mode(lambda x, u: np.array([u[0] - x[0], rate(x), 1.0]), CLOCK)
     assert check(source).status is mg.Status.CERTIFIED

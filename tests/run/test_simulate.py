@@ -27,9 +27,7 @@ def lag(name: str, to: float, start: Any = None, **options: Any) -> Mode:
 
 
 def test_the_switch_happens_when_x_enters_the_next_start_set() -> None:
-    run = simulate(
-        [lag("a", 0.0), lag("b", 1.0, Box([-0.5], [0.5]))], [None, None], [(0.0, 2.0)], [2.0], stay=3.0
-    )
+    run = simulate([lag("a", 0.0), lag("b", 1.0, Box([-0.5], [0.5]))], [None, None], [(0.0, 2.0)], [2.0], stay=3.0)
     assert run.ok
     assert run.switch_times == pytest.approx([math.log(4.0)], abs=1e-8)
     k = run.mode.index("b")
@@ -154,9 +152,7 @@ def test_disturbance_and_unknowns_are_at_their_centres_and_plant_replaces_them()
 
 def test_time_of_a_plant_goes_on_through_a_switch() -> None:
     modes = [lag("a", 0.0), lag("b", 0.0, Box([0.5], [9]))]
-    run = simulate(
-        modes, [None, None], [(0.0, 1.0)], [0.0], plant=lambda t: np.array([1.0 + 0 * t]), stay=1.0
-    )
+    run = simulate(modes, [None, None], [(0.0, 1.0)], [0.0], plant=lambda t: np.array([1.0 + 0 * t]), stay=1.0)
     assert run.switch_times == pytest.approx([0.5])
     later = simulate(modes, [None, None], [(0.0, 1.0)], [0.0], plant=lambda t: np.array([2 * t]), stay=1.0)
     assert later.x[-1, 0] == pytest.approx((math.sqrt(0.5) + 1.0) ** 2)
@@ -170,9 +166,7 @@ def test_a_start_outside_needs_force() -> None:
 
 
 def test_a_run_that_never_arrives_ends_and_says_so() -> None:
-    run = simulate(
-        [lag("a", 0.0), lag("b", 0.0, Box([5], [6]))], [None, None], [(0.0, 1.0)], [1.0], force=True
-    )
+    run = simulate([lag("a", 0.0), lag("b", 0.0, Box([5], [6]))], [None, None], [(0.0, 1.0)], [1.0], force=True)
     assert not run.ok
     assert "did not reach" in run.message
     assert len(run.switch_times) == 0

@@ -13,9 +13,7 @@ from tests.soundness.sets import excess
 Vector = np.ndarray
 
 
-def signals(
-    loop: Loop, target: Any | None, rng: np.random.Generator
-) -> Callable[[int], tuple[Policy, float]]:
+def signals(loop: Loop, target: Any | None, rng: np.random.Generator) -> Callable[[int], tuple[Policy, float]]:
     """A source of (policy, hold) pairs; the k-th start of a campaign takes the k-th pair."""
     box = loop.system.disturbance
     if box is None:
@@ -28,9 +26,7 @@ def signals(
         lambda: bang_bang(corners, rng),
         lambda: greedy(loop, box, target_gradient(target, loop), hold=0.05),
         lambda: greedy(loop, box, target_gradient(target, loop, sign=-1.0), hold=0.08),
-        lambda: square_wave(
-            box, period=float(rng.uniform(0.3, 6.5)), phase=float(rng.uniform(0, 1)), rng=rng
-        ),
+        lambda: square_wave(box, period=float(rng.uniform(0.3, 6.5)), phase=float(rng.uniform(0, 1)), rng=rng),
         lambda: greedy(loop, box, coordinate_gradient(loop, int(rng.integers(loop.n)), rng), hold=0.06),
     ]
     return lambda k: kinds[k % len(kinds)]()
@@ -56,9 +52,7 @@ def square_wave(box: Any, period: float, phase: float, rng: np.random.Generator)
     return policy, max(period / 8, 0.04)
 
 
-def greedy(
-    loop: Loop, box: Any, gradient: Callable[[float, Vector], Vector], hold: float
-) -> tuple[Policy, float]:
+def greedy(loop: Loop, box: Any, gradient: Callable[[float, Vector], Vector], hold: float) -> tuple[Policy, float]:
     """The corner that pushes hardest along ``gradient`` at every decision."""
     centre, radius = (box.lo + box.hi) / 2, (box.hi - box.lo) / 2
 

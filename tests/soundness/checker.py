@@ -142,9 +142,7 @@ def contradictions(loop: Loop, trajectory: Trajectory, claim: Claim, tolerance: 
     return found
 
 
-def first_entry(
-    loop: Loop, trajectory: Trajectory, region: Any, latest: float, tolerance: float
-) -> float | None:
+def first_entry(loop: Loop, trajectory: Trajectory, region: Any, latest: float, tolerance: float) -> float | None:
     """First instant up to ``latest`` at which the run is inside the set (closest approaches are refined)."""
     t = trajectory.t
     value = excess(region, trajectory.y[:, : loop.n])
@@ -166,9 +164,7 @@ def first_entry(
     return None
 
 
-def _bisect(
-    loop: Loop, trajectory: Trajectory, region: Any, outside: float, inside: float, tolerance: float
-) -> float:
+def _bisect(loop: Loop, trajectory: Trajectory, region: Any, outside: float, inside: float, tolerance: float) -> float:
     while inside - outside > 1e-11:
         middle = (inside + outside) / 2
         if excess(region, trajectory.at(middle)[: loop.n])[0] <= tolerance:
@@ -220,11 +216,7 @@ def refutation_holds(
         if entry is None:
             return None
         broken = _first_broken(loop, trajectory)
-        return (
-            None
-            if broken is not None and broken <= entry
-            else f"the witness enters the target at t = {entry}"
-        )
+        return None if broken is not None and broken <= entry else f"the witness enters the target at t = {entry}"
     broken = _first_broken(loop, trajectory) or _broken_near(loop, trajectory, witness.time)
     if broken is None:
         return f"the witness violates nothing up to t = {until}" if trajectory.ended >= until else None

@@ -44,9 +44,7 @@ def cubic(a: np.ndarray, b: np.ndarray, duration: float) -> Signal:
     return signal
 
 
-def trapezoid(
-    a: np.ndarray, b: np.ndarray, speed: float, acceleration: float
-) -> tuple[Signal, tuple[float, ...]]:
+def trapezoid(a: np.ndarray, b: np.ndarray, speed: float, acceleration: float) -> tuple[Signal, tuple[float, ...]]:
     """Synchronised trapezoid: the longest coordinate runs at its limits, the others keep its clock."""
     way = float(np.max(np.abs(b - a)))
     ramp = speed / acceleration
@@ -77,9 +75,7 @@ class Source:
     claims: tuple[Claim, ...]
 
     def examine(self, runs: int, seed: int = 0) -> list[Violation]:
-        return examine(
-            self.mode, self.claims, runs=runs, seed=seed, p=self.p, signal=self.signal, breaks=self.breaks
-        )
+        return examine(self.mode, self.claims, runs=runs, seed=seed, p=self.p, signal=self.signal, breaks=self.breaks)
 
 
 def arm_sources(graph: Any, module: ModuleType) -> list[Source]:

@@ -142,14 +142,10 @@ def _gain(rng: np.random.Generator, field: Callable[..., Any], centre: Vector, n
     names = field.__code__.co_varnames[: field.__code__.co_argcount]
 
     def slope(x: Vector, u: Vector) -> Vector:
-        return np.asarray(
-            field(**{k: v for k, v in {"x": x, "u": u, **nominal}.items() if k in names}), float
-        )
+        return np.asarray(field(**{k: v for k, v in {"x": x, "u": u, **nominal}.items() if k in names}), float)
 
     zero, step = np.zeros(1), 1e-6
-    A = np.stack(
-        [(slope(centre + step * e, zero) - slope(centre - step * e, zero)) / (2 * step) for e in np.eye(n)], 1
-    )
+    A = np.stack([(slope(centre + step * e, zero) - slope(centre - step * e, zero)) / (2 * step) for e in np.eye(n)], 1)
     b = (slope(centre, zero + 1.0) - slope(centre, zero))[:, None]
     P = solve_continuous_are(A, b, np.eye(n) * float(rng.choice([1.0, 4.0])), np.eye(1))
     return np.asarray((b.T @ P)[0]).round(3)
@@ -201,9 +197,7 @@ def _sample(mode: Any, rng: np.random.Generator) -> list[tuple[Vector, Vector]]:
     return found
 
 
-def _bound(
-    rng: np.random.Generator, samples: list[tuple[Vector, Vector]], n: int
-) -> tuple[int, float, float] | None:
+def _bound(rng: np.random.Generator, samples: list[tuple[Vector, Vector]], n: int) -> tuple[int, float, float] | None:
     if rng.uniform() < 0.35 or not samples:
         return None
     axis = int(rng.integers(n))
@@ -213,9 +207,7 @@ def _bound(
     return axis, round(lo - slack, 3), round(hi + slack, 3)
 
 
-def _targets(
-    rng: np.random.Generator, samples: list[tuple[Vector, Vector]], centre: Vector, n: int
-) -> tuple[Any, ...]:
+def _targets(rng: np.random.Generator, samples: list[tuple[Vector, Vector]], centre: Vector, n: int) -> tuple[Any, ...]:
     if not samples:
         return (mg.Target("rest", mg.Ball(centre, 0.2)), mg.Target("far", mg.Box(centre + 2.0, centre + 2.5)))
     flows = np.stack([x for _, x in samples])  # (runs, times, n)

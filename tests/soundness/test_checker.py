@@ -88,7 +88,5 @@ def test_a_right_refutation_passes():
 def test_wrong_refutations_are_found_out():
     goal = mg.Box([-0.1], [0.1])
     assert "enters" in (refutation_holds(decay(), goal, refuted(0.6, "horizon", 2.0), 2.0) or "")
-    assert "not in the start set" in (
-        refutation_holds(decay(), goal, refuted(1.5, "horizon", 2.0), 2.0) or ""
-    )
+    assert "not in the start set" in (refutation_holds(decay(), goal, refuted(1.5, "horizon", 2.0), 2.0) or "")
     assert "violates nothing" in (refutation_holds(decay(), goal, refuted(1.0, "violates", 0.0), 2.0) or "")

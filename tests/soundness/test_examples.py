@@ -41,8 +41,7 @@ def test_arm_campaign(arm: list[Any], part: int, record_property: Any) -> None:
     found = source.examine(runs=1000, seed=7)
     record_property(
         "campaign",
-        f"two_link_arm {source.mode.name}: 1000 starts x {len(source.claims)} switches, "
-        f"{len(found)} violations",
+        f"two_link_arm {source.mode.name}: 1000 starts x {len(source.claims)} switches, {len(found)} violations",
     )
     assert not found
 

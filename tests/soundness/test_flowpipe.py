@@ -18,9 +18,7 @@ from tests.soundness.sets import starts
 RUNS = 10
 
 
-def escapes(
-    mode: Any, pipe: Any, until: float, *, signal: Any = None, breaks: tuple[float, ...] = ()
-) -> list[str]:
+def escapes(mode: Any, pipe: Any, until: float, *, signal: Any = None, breaks: tuple[float, ...] = ()) -> list[str]:
     """Samples of random runs that lie outside ``pipe.at(t)`` or ``pipe.hull(t0, t1)``."""
     rng = np.random.default_rng(5)
     unknowns = mode.system.unknowns or {}
@@ -50,16 +48,12 @@ def _outside(box: Any, y: np.ndarray, t: float, tolerance: float = 2e-9) -> list
     return [f"state {k} is {over[k]:.3g} outside at t = {t:.6g}"] if over[k] > tolerance else []
 
 
-@pytest.mark.parametrize(
-    "name, until", [("q1", 1.5), ("q2", 1.5), ("q3", 1.0), ("q4", 6.5), ("q5", 1.5), ("q7", 1.5)]
-)
+@pytest.mark.parametrize("name, until", [("q1", 1.5), ("q2", 1.5), ("q3", 1.0), ("q4", 6.5), ("q5", 1.5), ("q7", 1.5)])
 def test_two_link_arm(name: str, until: float) -> None:
     module = load("two_link_arm")
     mode = next(m for m in module.modes if m.name == name)
     trap, cuts = trapezoid(module.A, module.B, 1.25, 5.0)
-    signal, breaks = {"q4": (cubic(module.A, module.B, 6.0), (6.0,)), "q5": (trap, cuts)}.get(
-        name, (None, ())
-    )
+    signal, breaks = {"q4": (cubic(module.A, module.B, 6.0), (6.0,)), "q5": (trap, cuts)}.get(name, (None, ()))
     pipe = mg.flowpipe(mode, horizon=until)
     assert pipe.complete, pipe.reason
     assert not escapes(mode, pipe, until, signal=signal, breaks=breaks)

@@ -20,9 +20,7 @@ BUDGET = 15.0
 """Seconds of work for one question; a trap is small."""
 
 
-def flow(
-    name: str, dynamics: Callable[..., Any], start: Any, *, states: Any = None, **options: Any
-) -> mg.Mode:
+def flow(name: str, dynamics: Callable[..., Any], start: Any, *, states: Any = None, **options: Any) -> mg.Mode:
     """A mode whose plant needs no control: x' = dynamics(x) or dynamics(x, w, d)."""
     plant_options = {key: options.pop(key) for key in ("disturbance", "unknowns") if key in options}
     plant = mg.System(dynamics, states=start.dim if states is None else states, inputs=1, **plant_options)

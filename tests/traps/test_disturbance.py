@@ -38,9 +38,7 @@ def test_a_resonant_disturbance_is_worse_than_every_constant_one():
 def test_a_disturbance_through_a_state_dependent_matrix():
     # x' = (w - 1) x: |w| <= 1.1 can make it grow; freezing the factor x at the start would not notice.
     def mode(size: float) -> mg.Mode:
-        return flow(
-            "gain", lambda x, w: (w - 1.0) * x, mg.Box([0.9], [1.0]), disturbance=mg.Box([-size], [size])
-        )
+        return flow("gain", lambda x, w: (w - 1.0) * x, mg.Box([0.9], [1.0]), disturbance=mg.Box([-size], [size]))
 
     assert_not_certified(mode(1.1), goal([-0.5], [0.5]), 8.0)
     assert_certified(mode(0.5), goal([-0.5], [0.5]), 8.0)

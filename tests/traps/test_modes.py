@@ -66,9 +66,7 @@ def holding(at: float, name: str = "hold", memory: mg.Memory | None = None, star
 
 def test_a_start_set_on_plant_and_memory_is_decided_on_the_plant_state():
     # "joint" may start where (x, reset(x)) = (x, 2 x) is in the box: |x| <= .1, not |x| <= .5.
-    joint = holding(
-        0.0, "joint", mg.Memory(1, lambda z: -z, lambda x: 2.0 * x), start=mg.Box([-0.5, -0.2], [0.5, 0.2])
-    )
+    joint = holding(0.0, "joint", mg.Memory(1, lambda z: -z, lambda x: 2.0 * x), start=mg.Box([-0.5, -0.2], [0.5, 0.2]))
     assert_not_certified(holding(0.3), joint, 8.0)
     assert_certified(holding(0.05), joint, 8.0)
 

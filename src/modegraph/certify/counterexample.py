@@ -206,4 +206,3 @@ def candidate_starts(scene: Scene, hints: Sequence[Floats]) -> list[Floats]:
         if not any(np.array_equal(x, y) for y in unique):
             unique.append(x)
     return unique
-

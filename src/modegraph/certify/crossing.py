@@ -58,7 +58,7 @@ class Reach:
         limit = np.inf if horizon is None else horizon
         times = flow.times
         self.times = times
-        self.usable = int(min(self.proved, np.searchsorted(times, limit, side="right") - 1))
+        self.usable = min(self.proved, int(np.searchsorted(times, limit, side="right")) - 1)
         self.reset = reset
         self._sets: list[tuple[Floats, Floats]] = []
         self._targets: dict[int, tuple[Floats, list[Floats]]] = {}
@@ -253,4 +253,3 @@ def widest_variable(bounds: PolynomialBounds, p: Floats) -> int:
         size = np.abs(p[:, uses]).sum(axis=1) + np.abs(p[:, uses & nonlinear]).sum(axis=1)
         share[v] = float((size * weight).max())
     return int(np.argmax(share))
-

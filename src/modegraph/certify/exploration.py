@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.evaluate import Evaluator
 from ..expression.tape import Tape
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
@@ -17,7 +16,8 @@ from ..reach.parallelotope import mode_gap
 from ..reach.restart import restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
-from .crossing import Missed, Reach, find_crossings, proved_instants, sample_powers, widest_variable
+from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
+from .evidence import nonlinear_variable, sampled_violation, slack_until
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
 
@@ -77,7 +77,7 @@ class Exploration:
         self,
         fields: Sequence[Field],
         framed: Sequence[Field],
-        goals: Sequence[Goal],
+        goals: Mapping[int, Goal],
         *,
         plant: int,
         w: tuple[Floats, Floats],
@@ -135,7 +135,11 @@ class Exploration:
         part = self._follow([self.continued[id(flow)]], [flow], found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
-            why = part.failure or part.unproved or f"at t = {part.last.time:.6g} s the disturbance has filled the reach set"
+            why = (
+                part.failure
+                or part.unproved
+                or f"at t = {part.last.time:.6g} s the disturbance has filled the reach set"
+            )
             found.parked, found.waiting, found.waiting_safety = [], {}, None
             found.failure = f"{why}; a smaller start set or disturbance would help"
             return
@@ -255,7 +259,7 @@ class Exploration:
         start = self.fields[-1].start
         tail: Tail | None = None
         reason = ""
-        previous = {j: np.inf for j in wanted}
+        previous = dict.fromkeys(wanted, np.inf)
         pending = list(wanted)
         checkpoint = 8
         taken = len(flow.steps)
@@ -316,9 +320,9 @@ class Exploration:
         flow = last[0]
         framed = not first or mode_gap(flow.slope) > WIDE_GAP
         following = restarted(last, self.framed if framed else self.fields, RESTART_ORDER)
-        if following is not None and following.time < end and following.advance(end):
-            if proved_instants(following) == len(following.steps):
-                return following
+        started = following is not None and following.time < end and following.advance(end)
+        if following is not None and started and proved_instants(following) == len(following.steps):
+            return following
         flow.next_restart = len(flow.steps) + RESTART_STEPS
         return None
 
@@ -450,51 +454,6 @@ def _count(m: int, degree: int) -> int:
     for k in range(1, degree + 1):
         count = count * (m + k) // k
     return count
-
-
-def slack_until(flow: Flow, instant: int) -> dict[str, float]:
-    """Proved slack of every constraint on [0, times[instant]]."""
-    many: list[dict[str, float]] = []
-    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
-    many.append(_by_name(flow.fields[flow.first_segment].faces, upper))
-    for step in flow.steps[:instant]:
-        many.append(_by_name(flow.fields[step.segment].faces, step.face_upper))
-    return least_slack(many)
-
-
-def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
-    out: dict[str, float] = {}
-    for name, value in zip(names, upper, strict=True):
-        out[name] = min(-float(value), out.get(name, np.inf))
-    return out
-
-
-def nonlinear_variable(flow: Flow) -> int:
-    """The variable with the largest share in the nonlinear terms early in the flow."""
-    k = max(1, len(flow.steps) // 3) if flow.steps else 0
-    p, _ = flow.set_at(k)
-    exponents = flow.bounds.exponents
-    weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
-    degree = exponents.sum(axis=1)
-    share = np.zeros(flow.piece.variables)
-    for v in range(len(share)):
-        uses = (exponents[:, v] > 0) & (degree > 1)
-        share[v] = float((np.abs(p[:, uses]) * exponents[uses, v]).sum(axis=1) @ weight)
-    if not share.any():
-        return widest_variable(flow.bounds, p)
-    return int(np.argmax(share))
-
-
-def sampled_violation(flow: Flow) -> bool:
-    """Whether a sampled trajectory breaks a constraint at the end of the flow (floats: a guess)."""
-    fld = flow.fields[flow.steps[-1].segment if flow.steps else 0]
-    if not fld.faces:
-        return False
-    p, G = flow.set_at(len(flow.steps))
-    powers = sample_powers(flow.piece, flow.bounds.exponents)
-    inputs, _ = flow.variables_at(flow.time, p, G, fld)
-    faces = Evaluator(fld.observed)(inputs @ powers.T)[: len(fld.faces)]
-    return bool((faces > 0.0).any())
 
 
 def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:

@@ -56,9 +56,9 @@ class Region:
         rows = [row for row, _ in self._faces]
         self.A = np.array([[float(v) for v in row] for row in rows]).reshape(len(rows), self.dim)
         # |A - exact normal|, rounded up; normals that are doubles are exact.
-        self.dA = np.array(
-            [[exact.round_up(abs(Fraction(float(v)) - v)) for v in row] for row in rows]
-        ).reshape(len(rows), self.dim)
+        self.dA = np.array([[exact.round_up(abs(Fraction(float(v)) - v)) for v in row] for row in rows]).reshape(
+            len(rows), self.dim
+        )
         self.b = np.array([exact.round_down(bound) for _, bound in self._faces])
         centre = target.chebyshev[0] if isinstance(target, Polytope) else np.asarray(target.center, float)
         self.centre = centre
@@ -181,8 +181,9 @@ class Region:
 
     def separated(self, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
         """For boxes (K, n): True where the box provably has no point in the set."""
-        known = np.isfinite(lo).all(axis=1) & np.isfinite(hi).all(axis=1)
-        return known & self._separated(np.where(known[:, None], lo, 0.0), np.where(known[:, None], hi, 0.0))
+        known = np.asarray(np.isfinite(lo).all(axis=1) & np.isfinite(hi).all(axis=1))
+        apart = self._separated(np.where(known[:, None], lo, 0.0), np.where(known[:, None], hi, 0.0))
+        return np.asarray(known & apart)
 
     def _separated(self, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
         n = self.dim

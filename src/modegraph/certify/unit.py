@@ -9,19 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ModegraphError
-from ..expression.evaluate import Evaluator
-from ..expression.tape import Tape, compile_tape
-from ..model.closed_loop import ClosedLoop, close_loop, mode_start
+from ..model.closed_loop import close_loop, mode_start
 from ..model.mode import Mode
-from ..model.sets import Set, is_subset
+from ..model.sets import is_subset
 from ..model.target import Target
-from ..reach.field import Field, Frame, compile_field, disturbance_box
+from ..reach.compiled import CompiledMode, compile_mode, compile_reset
 from ..reach.flow import Flow, Order
-from ..reach.parallelotope import slow_and_fast_axes
-from ..reach.start import Piece, whole
 from ..reach.tail import Tail, TailSearch
 from .counterexample import Equilibrium, PointRun, Scene, candidate_starts, enclose_equilibrium, trapped_in
-from .exploration import Exploration, Findings, Goal, slack_until
+from .evidence import slack_until
+from .exploration import Exploration, Findings, Goal
 from .proof import SwitchProof, certified_check, certified_switch
 from .region import Region
 from .verdict import Floats, Status, Verdict, Witness
@@ -45,77 +42,6 @@ class UnitResult:
 
     verdicts: list[Verdict]
     check: Verdict
-
-
-@dataclass(frozen=True)
-class CompiledMode:
-    """A mode under one reference, ready for the engine."""
-
-    loop: ClosedLoop
-    fields: list[Field]
-    start: Set
-    reset: Tape | None
-    w_centre: Floats
-    w_radius: Floats
-    unknowns: dict[str, tuple[float, float]]
-    stops: list[float]
-
-    @property
-    def plant(self) -> int:
-        return len(self.loop.states) - len(self.loop.reset)
-
-    def framed_fields(self) -> list[Field]:
-        """The fields in the modes of the loop, where a disturbance meets a nonlinear loop."""
-        if all(f.linear for f in self.fields) or not self.w_radius.any():
-            return self.fields
-        axes = slow_and_fast_axes(self._slope())
-        frame = None if (axes == np.eye(len(axes))).all() else Frame.of(axes)
-        if frame is None:
-            return self.fields
-        return [compile_field(self.loop, segment, frame) for segment in self.loop.segments]
-
-    def _slope(self) -> Floats:
-        """Float Jacobian (n, n) of the last segment at the centre of the starts."""
-        fld = self.fields[-1]
-        n = fld.states
-        x = np.zeros(n)
-        centre = np.asarray(self.start.center, float)
-        x[: len(centre)] = centre
-        d = [0.5 * (lo + hi) for lo, hi in self.unknowns.values()]
-        at = np.concatenate([x, [fld.start], self.w_centre, d])[:, None]
-        return np.asarray(Evaluator(fld.jacobian)(at)[: n * n, 0].reshape(n, n))
-
-    def whole(self) -> Piece:
-        return whole(self.start, list(self.unknowns.values()))
-
-    @property
-    def own_reset(self) -> Tape | None:
-        """The reset to apply to the start set; None where the set already holds the memory."""
-        return self.reset if self.start.dim == self.plant else None
-
-
-def compile_reset(loop: ClosedLoop) -> Tape | None:
-    """The memory on entry as a function of the plant states."""
-    if not loop.reset:
-        return None
-    return compile_tape(loop.reset, loop.states[: len(loop.states) - len(loop.reset)])
-
-
-def compile_mode(mode: Mode, p: Floats | None, start: Set | None = None) -> CompiledMode:
-    """Trace and compile a mode; raises `ModegraphError` where the model is wrong."""
-    loop = close_loop(mode, p)
-    centre, radius = disturbance_box(loop, mode.system.disturbance)
-    unknowns = {name: (float(lo), float(hi)) for name, (lo, hi) in (mode.system.unknowns or {}).items()}
-    return CompiledMode(
-        loop=loop,
-        fields=[compile_field(loop, segment) for segment in loop.segments],
-        start=mode_start(mode, p) if start is None else start,
-        reset=compile_reset(loop),
-        w_centre=centre,
-        w_radius=radius,
-        unknowns=unknowns,
-        stops=[],
-    )
 
 
 def certify_unit(
@@ -188,7 +114,7 @@ class _Unit:
         exploration = Exploration(
             compiled.fields,
             compiled.framed_fields(),
-            [self.goals.get(k) for k in range(len(self.targets))],
+            dict(self.goals),
             plant=compiled.plant,
             w=(compiled.w_centre, compiled.w_radius),
             names=compiled.loop.names,
@@ -363,11 +289,16 @@ class _Unit:
                 verdict = Verdict(Status.REFUTED, reason, witness=witness)
             elif tail is not None and apart >= run.flow.time and self._outside(region, tail):
                 witness = run.witness("trapped", tail.start, self.p, at)
-                reason = f"the start {x0}{under} never reaches the target: it is trapped outside from t = {tail.start:.4g} s"
+                reason = (
+                    f"the start {x0}{under} never reaches the target: it is trapped outside from t = {tail.start:.4g} s"
+                )
                 verdict = Verdict(Status.REFUTED, reason, witness=witness)
             elif self.horizon is not None and run.violation is None and apart >= self.horizon:
                 witness = run.witness("horizon", self.horizon, self.p, at)
-                reason = f"the start {x0}{under} stays outside the target up to the horizon of {self.horizon:g} s (this horizon only)"
+                reason = (
+                    f"the start {x0}{under} stays outside the target up to the horizon of "
+                    f"{self.horizon:g} s (this horizon only)"
+                )
                 verdict = Verdict(Status.REFUTED, reason, witness=witness, horizon=self.horizon)
             if verdict is not None:
                 self.verdicts[k] = verdict
@@ -420,4 +351,3 @@ def _short(x: Floats) -> str:
 
 def _under(w: Floats | None) -> str:
     return "" if w is None else f" under the constant disturbance {_short(w)}"
-

@@ -19,7 +19,7 @@ from .rounding import LIBM, UNIT, UP
 @njit(**KERNEL)
 def taylor_coefficients(op, x, dmax, series):
     """series[k] ~ f^(k)(x)/k! for k = 0..dmax."""
-    if op == SIN or op == COS:
+    if op in (SIN, COS):
         sine = math.sin(x)
         cosine = math.cos(x)
         f = 1.0
@@ -64,7 +64,7 @@ def taylor_coefficients(op, x, dmax, series):
 @njit(**KERNEL)
 def taylor_errors(op, x, r, dmax, series, size, error):
     """Fill size[k] >= |series[k]| and error[k]; return the Lagrange factor (inf: r too large)."""
-    if op == SIN or op == COS:
+    if op in (SIN, COS):
         f = 1.0
         for k in range(dmax + 1):
             if k > 1:

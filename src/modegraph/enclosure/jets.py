@@ -17,12 +17,10 @@ from ..expression.ops import (
     CONST,
     COS,
     EXP,
-    LOG,
     MUL,
     MULC,
     RECIP,
     RELU,
-    SIN,
     SQR,
     STEP,
     SUB,
@@ -31,7 +29,6 @@ from ..expression.ops import (
 )
 from .elementary import taylor_coefficients
 from .polynomial import KERNEL, compose_into, multiply_into
-
 
 PLAIN = 1.0
 TOO_WIDE = 2.0
@@ -76,7 +73,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             c[0] = kinks[q, 1]
             dg[q, 0] = 0
         return
-    if op == ADD or op == SUB:
+    if op in (ADD, SUB):
         da = min(dg[a, j], dmax)
         db = min(dg[b, j], dmax)
         d = max(da, db)
@@ -88,7 +85,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
         else:
             for k in range(start[db + 1]):
                 c[k] -= P[b, j, k]
-    elif op == MULC or op == ADDC or op == WHERE or op == RELU:
+    elif op in (MULC, ADDC, WHERE, RELU):
         f = 1.0
         shift = 0.0
         if op == MULC:
@@ -238,9 +235,7 @@ def solve_in_time(
         for q in range(ops.shape[0]):
             if j == 0:
                 decide_kink(q, ops, P, dg, kinks, ranges, start)
-            node_coefficient(
-                q, j, ops, const, kinks, P, dg, cut[j], w1, w2, series, product, offset, start, degree
-            )
+            node_coefficient(q, j, ops, const, kinks, P, dg, cut[j], w1, w2, series, product, offset, start, degree)
         if j < K:
             for i in range(states):
                 v = variables[i]

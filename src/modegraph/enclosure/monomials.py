@@ -89,7 +89,7 @@ def monomials(weights: tuple[int, ...], order: int) -> Monomials:
         left = np.repeat(left, counts) - power * weight
         rows = np.column_stack([rows, power])
     degree = order - left
-    keys = tuple(-rows[:, v] for v in range(m - 1, -1, -1)) + (degree,)
+    keys = (*tuple(-rows[:, v] for v in range(m - 1, -1, -1)), degree)
     by_degree = np.lexsort(keys)
     exponents = np.ascontiguousarray(rows[by_degree].reshape(total, m))
     degree = np.ascontiguousarray(degree[by_degree])

@@ -35,14 +35,12 @@ def observe_step(
     for r in range(ranges.shape[0]):
         ranges[r, 0] = np.nan
         ranges[r, 1] = np.nan
-    for attempt in range(2):
+    for _attempt in range(2):
         solve_in_time(
             ops, const, kinks, ranges, outputs, variables, 0, Q, dq, h, KQ, cut, product, offset, start, degree
         )
         coefficient_norms(Q, dq, nQ, start)
-        remainders(
-            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree
-        )
+        remainders(ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree)
         if not wants_another_try(ops, kinks, ranges):
             break
     ends = np.zeros((3, count, Nq))
@@ -99,7 +97,7 @@ def enclose_at(
     for r in range(ranges.shape[0]):
         ranges[r, 0] = np.nan
         ranges[r, 1] = np.nan
-    for attempt in range(2):
+    for _attempt in range(2):
         solve_in_time(
             ops, const, kinks, ranges, outputs, variables, 0, Q, dq, 1.0, 0, cut, product, offset, start, degree
         )

@@ -120,9 +120,7 @@ def composition_error(op, x, u, dmax, pairs, series, size, error, power, next_po
 
 
 @njit(**KERNEL)
-def remainders(
-    ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start, degree
-):
+def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start, degree):
     """Fill R[q] for every node that is not a variable; R of the variables is given.
 
     Also fills ranges[q] with the range of the argument of relu, step and where nodes. A node that
@@ -172,13 +170,13 @@ def remainders(
                     if bad < 0:
                         bad = q
                 continue
-        if op == ADD or op == SUB:
+        if op in (ADD, SUB):
             r = R[a] + R[b] + 2.0 * UNIT * (A[a] + A[b])
             for j in range(K + 1):
                 e = min(cut[j] + 1, n + 1)
                 r += tails[a, j, e] + tails[b, j, e]
             R[q] = r * UP
-        elif op == MULC or op == ADDC:
+        elif op in (MULC, ADDC):
             f = abs(const[q]) if op == MULC else 1.0
             r = 0.0
             for j in range(K + 1):
@@ -194,12 +192,8 @@ def remainders(
         elif op == SIN:
             # E = stored - true obeys E_s' = E_c a' + d1, E_c' = -E_s a' + d2: a rotation, so
             # |E|_2 <= |E(0)|_2 + int |d|_2 <= |E(0)|_2 + D1 + D2.
-            es = composition_error(
-                SIN, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
-            )
-            ec = composition_error(
-                COS, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
-            )
+            es = composition_error(SIN, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
+            ec = composition_error(COS, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
             speed = 0.0
             for j in range(1, K + 1):
                 speed += j * tails[a, j, 0]
@@ -215,24 +209,20 @@ def remainders(
             for j in range(1, K + 1):
                 speed += j * tails[a, j, 0]
                 travel += tails[a, j, 0]
-            e0 = composition_error(
-                EXP, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
-            )
+            e0 = composition_error(EXP, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
             d1 = truncated_part(norms[a], tails[q], tails[a], K, cut, True) + gamma * speed * A[q]
             # E' = E a' + d: |E(s)| <= (|E(0)| + D) exp(a(s) - a(tau)).
             stored = (e0 + d1) * math.exp(travel * UP) * UP
             top = P[a, 0, 0] + (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0)))
             lip = math.exp(top + 4.0 * UNIT * (abs(top) + A[a])) * math.expm1(R[a] * UP)
             R[q] = (stored + lip * (1.0 + 4.0 * LIBM)) * UP + TINY
-        elif op == LOG or op == ATAN:
+        elif op in (LOG, ATAN):
             travel = 0.0
             speed = 0.0
             for j in range(1, K + 1):
                 travel += tails[a, j, 0]
                 speed += j * tails[a, j, 0]
-            e0 = composition_error(
-                op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
-            )
+            e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
             d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, True) + gamma * speed * A[b]
             # E' = (stored g - g) a' + d with g = 1/a or 1/(1 + a^2), whose remainder is R[b].
             lip = R[a] if op == ATAN else R[a] * (A[b] + R[b])
@@ -339,7 +329,7 @@ def wants_another_try(ops, kinks, ranges):
     stored polynomials can be chosen better."""
     for q in range(ops.shape[0]):
         op = ops[q, 0]
-        if (op == RELU or op == STEP) and ranges[q, 0] < 0.0 < ranges[q, 1]:
+        if (op in (RELU, STEP)) and ranges[q, 0] < 0.0 < ranges[q, 1]:
             return True
         if op >= RECIP and op <= ATAN and kinks[q, 0] == TOO_WIDE:
             return True

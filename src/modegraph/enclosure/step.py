@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .disturbance import DROPPED, disturbance_bounds, disturbance_columns
 from .jets import solve_in_time
 from .polynomial import KERNEL
+from .quadratic import MAIN_GENERATORS, main_generators, quadratic_bound
 from .remainder import coefficient_norms, remainders, wants_another_try
 from .rounding import TINY, UNIT, UP
 from .variational import (
     advance_generators,
-    apply_matrix,
     chord_distance,
     exponential_majorant,
     fundamental_defect,
@@ -32,12 +33,6 @@ UNDEFINED = 1
 JACOBIAN_UNDEFINED = 2
 NO_GROWTH_BOUND = 3
 NO_CONTRACTION = 4
-
-MAIN_GENERATORS = 40
-"""Generators whose signs are followed through the quadratic terms."""
-
-SIGMA_2 = 0.1284
-"""int_0^1 |s^2/2 - 1/6| ds = 2 / (9 sqrt(3)) = 0.12830..., rounded up."""
 
 
 @njit(**KERNEL)
@@ -72,7 +67,7 @@ def taylor_step(
         ranges[q, 0] = np.nan
         ranges[q, 1] = np.nan
     bad = -1
-    for attempt in range(2):
+    for _attempt in range(2):
         solve_in_time(
             ops, const, kinks, ranges, outputs, variables, n, P, dg, h, K, cut, product, offset, start, degree
         )
@@ -127,12 +122,6 @@ def truncate_inputs(P, dg, norms, variables, Q, dq, inputs, KQ, q, embed, start,
         lost[v] = s * UP
 
 
-SET_VARIABLE = -1
-DROPPED = -2
-"""Owners of a monomial of the Jacobian's table: kept, or of a degree that G and Psi do not carry;
-any other owner v means that the monomial holds the error variable of state v."""
-
-
 @njit(**KERNEL)
 def split_output(Q, o, KJ, q, embed, owner, errors, start, J, dJ, nJ, swing, hessian):
     """Split an output of the Jacobian tape: its polynomial J (KJ+1, Nq) in the set variables with
@@ -161,130 +150,6 @@ def split_output(Q, o, KJ, q, embed, owner, errors, start, J, dJ, nJ, swing, hes
     for v in range(swing.size):
         swing[v] *= UP
     return dropped * UP
-
-
-@njit(**KERNEL)
-def quadratic_bound(H, G0, G1, spread):
-    """Bounds (n,) of |e' H_i e| / 2 for e = (1 - s) g0 + s g1 + b, any s in [0, 1], |b| <= spread, where
-    g0 = sum_a G0_a zeta_a, g1 = sum_a G1_a zeta_a with the same |zeta_a| <= 1; H (n, n, n), G (K, n).
-
-    The weights (1 - s)^2, 2 s (1 - s), s^2 of the three products sum to one. The signs in the
-    generators count: along a slow mode what multiplies nearly cancels, in the box around it does not.
-    """
-    n = spread.size
-    count = G0.shape[0] + n
-    a0 = np.zeros((count, n))
-    a1 = np.zeros((count, n))
-    a0[: count - n] = G0
-    a1[: count - n] = G1
-    for v in range(n):
-        a0[count - n + v, v] = spread[v]
-        a1[count - n + v, v] = spread[v]
-    total = np.zeros(n)
-    for a in range(count):
-        for k in range(n):
-            total[k] += max(abs(a0[a, k]), abs(a1[a, k]))
-    out = np.zeros(n)
-    h0 = np.zeros(n)
-    h1 = np.zeros(n)
-    for i in range(n):
-        s00 = 0.0
-        s01 = 0.0
-        s11 = 0.0
-        size = 0.0
-        for b in range(count):
-            for k in range(n):
-                h0[k] = 0.0
-                h1[k] = 0.0
-                for l in range(n):
-                    h0[k] += H[i, k, l] * a0[b, l]
-                    h1[k] += H[i, k, l] * a1[b, l]
-                    size += abs(H[i, k, l]) * max(abs(a0[b, l]), abs(a1[b, l])) * total[k]
-            for a in range(count):
-                x00 = 0.0
-                x01 = 0.0
-                x10 = 0.0
-                x11 = 0.0
-                for k in range(n):
-                    x00 += a0[a, k] * h0[k]
-                    x01 += a0[a, k] * h1[k]
-                    x10 += a1[a, k] * h0[k]
-                    x11 += a1[a, k] * h1[k]
-                s00 += abs(x00)
-                s01 += 0.5 * (abs(x01) + abs(x10))
-                s11 += abs(x11)
-        out[i] = (0.5 * max(s00, max(s01, s11)) + 1.01 * (2 * n + 4) * UNIT * size) * UP + TINY
-    return out
-
-
-@njit(**KERNEL)
-def main_generators(G0, G1, most, spread):
-    """Constant coefficients of the ``most`` largest generators at both ends, (K, n) each; what is left
-    out, and everything that depends on the set variables, is added to ``spread`` (n,)."""
-    count, n, Nq = G0.shape
-    scale = np.zeros(n)
-    for a in range(count):
-        for i in range(n):
-            scale[i] += abs(G0[a, i, 0])
-    size = np.zeros(count)
-    for a in range(count):
-        for i in range(n):
-            size[a] -= abs(G0[a, i, 0]) / (scale[i] + TINY)
-    ranked = np.argsort(size)
-    kept = min(most, count)
-    out0 = np.zeros((kept, n))
-    out1 = np.zeros((kept, n))
-    for r in range(count):
-        a = ranked[r]
-        for i in range(n):
-            s0 = 0.0
-            s1 = 0.0
-            for k in range(0 if r >= kept else 1, Nq):
-                s0 += abs(G0[a, i, k])
-                s1 += abs(G1[a, i, k])
-            spread[i] += max(s0, s1) * UP
-            if r < kept:
-                out0[r, i] = G0[a, i, 0]
-                out1[r, i] = G1[a, i, 0]
-    for i in range(n):
-        spread[i] *= UP
-    return out0, out1
-
-
-@njit(**KERNEL)
-def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
-    """Mean over the step of each column of df/dw, its sup, and the radius of what the mean misses.
-
-    Output node ``outputs[first + i * nw + j]`` is df_i/dw_j. Returns B (nw, n, Nq), size (n,) =
-    sup |B| wr, miss (n,) = sup |df/dw - B| wr.
-    """
-    nw = radius.size
-    Nq = embed.size
-    B = np.zeros((nw, n, Nq))
-    size = np.zeros(n)
-    miss = np.zeros(n)
-    for i in range(n):
-        for j in range(nw):
-            o = outputs[first + i * nw + j]
-            a = 0.0
-            off = RQ[o]
-            for l in range(KJ + 1):
-                for k in range(owner.size):
-                    if owner[k] != SET_VARIABLE:
-                        off += abs(Q[o, l, k])
-                for k in range(Nq):
-                    x = Q[o, l, embed[k]]
-                    # sup over s in [0, 1] of |s^l - 1/(l + 1)| is l/(l + 1).
-                    off += abs(x) * l / (l + 1)
-                    a += abs(x) / (l + 1)
-                    B[j, i, k] += x / (l + 1)
-            off += 1.01 * (KJ + 3) * UNIT * a
-            size[i] += a * UP * radius[j]
-            miss[i] += off * UP * radius[j]
-    for i in range(n):
-        size[i] = size[i] * UP + TINY
-        miss[i] = miss[i] * UP + TINY
-    return B, size, miss
 
 
 @njit(**KERNEL)
@@ -328,10 +193,10 @@ def flow_step(
         if not defect[i] < np.inf:
             return UNDEFINED, max(bad, 0), nothing_p, G, nothing, nothing, defect, control
     z = np.zeros(n)
-    for g in range(G.shape[0]):
+    for row in range(G.shape[0]):
         for i in range(n):
             for k in range(Nq):
-                z[i] += abs(G[g, i, k])
+                z[i] += abs(G[row, i, k])
     z = z * UP
     lost = np.zeros(variables.size)
     J = np.zeros((n * n, KJ + 1, Nq))
@@ -358,7 +223,7 @@ def flow_step(
     B = np.zeros((nw, n, Nq))
     size_b = np.zeros(n)
     accepted = False
-    for attempt in range(8):
+    for _attempt in range(8):
         truncate_inputs(P, dg, norms, variables, Q, dq, jvariables, KJ, q, embed, start, lost)
         for v in range(variables.size):
             RQ[jvariables[v]] = lost[v]
@@ -535,47 +400,11 @@ def flow_step(
             for d in range(norms.shape[2]):
                 s += chord_distance(j) * norms[v, j, d]
         bend[i] = s * UP
-    first = np.zeros((nw, n, Nq))
-    second = np.zeros((nw, n, Nq))
-    if nw > 0:
-        # u' = h J(0, xi) u + h B(xi) v, so u(1) = int exp(Y (1 - s)) h B v ds with Y = h J(0, xi):
-        # two columns an input, and a box for the rest.
-        Y2 = matrix_product(Y, Y) * UP
-        largest = 0.0
-        for i in range(n):
-            largest = max(largest, h * size_b[i])
-        # Third and higher powers entry by entry, int (1 - s)^k / k! ds = 1 / (k + 1)!; the tail beyond
-        # in the infinity norm, hence in every entry.
-        high = np.zeros(n)
-        power = Y2
-        factorial = 6.0
-        tail = size_y * size_y
-        for k in range(3, 11):
-            power = matrix_product(power, Y) * UP
-            factorial *= k + 1
-            tail *= size_y
-            for i in range(n):
-                for l in range(n):
-                    high[i] += power[i, l] * h * size_b[l] / factorial
-        rest = tail * size_y / (12.0 * factorial) * np.exp(size_y) * largest
-        gamma = 1.01 * (2 * n * pairs + 3 * n + 16) * UNIT
-        for i in range(n):
-            s = rest + high[i]
-            for k in range(n):
-                identity = 1.0 if i == k else 0.0
-                s += (SIGMA_2 * Y2[i, k] + gamma * (identity + Y[i, k] + Y2[i, k])) * h * size_b[k]
-            box[i] += s * UP + TINY
-        for j in range(nw):
-            image, lost_1 = apply_matrix(J, dJ, B[j], n, q, h, product, offset, start, degree)
-            again, lost_2 = apply_matrix(J, dJ, image, n, q, h, product, offset, start, degree)
-            for i in range(n):
-                s = 0.75 * lost_1[i] + lost_2[i] / 6.0
-                for k in range(n):
-                    s += Y[i, k] * lost_1[k] / 6.0
-                box[i] += h * radius[j] * s * UP
-                for l in range(Nq):
-                    first[j, i, l] = h * radius[j] * (B[j, i, l] + image[i, l] / 2.0 + again[i, l] / 6.0)
-                    second[j, i, l] = h * radius[j] * image[i, l] / 4.0
+    first, second, outside = disturbance_columns(
+        J, dJ, B, size_b, radius, Y, size_y, h, q, pairs, product, offset, start, degree
+    )
+    for i in range(n):
+        box[i] = (box[i] + outside[i]) * UP
     old = H_end.shape[0]
     grown = np.zeros((old + n + 2 * nw, n, Nq))
     grown[:old] = H_end

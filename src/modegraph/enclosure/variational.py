@@ -214,7 +214,7 @@ def spectral_radius(A):
     n = A.shape[0]
     B = A.copy()
     log_scale = 0.0
-    for k in range(5):
+    for _k in range(5):
         top = 0.0
         for i in range(n):
             s = 0.0
@@ -304,9 +304,7 @@ def advance_generators(F, G, q, pairs, product, offset, start, degree):
         for r in range(n):
             for c in range(n):
                 if dG[c] >= 0 and dF[r, c] >= 0:
-                    multiply_into(
-                        H[g, r], F[r, c], dF[r, c], G[g, c], dG[c], q, 1.0, product, offset, start, degree
-                    )
+                    multiply_into(H[g, r], F[r, c], dF[r, c], G[g, c], dG[c], q, 1.0, product, offset, start, degree)
                     for d in range(1, dF[r, c] + 1):
                         lost[r] += nF[r, c, d] * tail[c, q + 1 - d]
                     lost[r] += gamma * sF[r, c] * tail[c, 0]

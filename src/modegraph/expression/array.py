@@ -45,8 +45,7 @@ class TracedArray(np.ndarray[Any, Any]):
         if self.size == 1:
             return bool(self.reshape(-1)[0])
         raise ModegraphError(
-            "a branch on an array of traced values: `if`, `and`, `or` cannot be traced; "
-            "use np.where(condition, a, b)"
+            "a branch on an array of traced values: `if`, `and`, `or` cannot be traced; use np.where(condition, a, b)"
         )
 
 

@@ -82,9 +82,7 @@ def solve(matrix: Any, right: Any) -> Any:
     m = _entries(graph, matrix, "solve")
     objects = nested(right)
     if objects.ndim not in (1, 2) or len(objects) != len(m):
-        raise ModegraphError(
-            f"np.linalg.solve: the right-hand side has shape {objects.shape}, the matrix {m.shape}"
-        )
+        raise ModegraphError(f"np.linalg.solve: the right-hand side has shape {objects.shape}, the matrix {m.shape}")
     columns = np.empty((len(m), objects.size // len(m)), dtype=object)
     for index in np.ndindex(columns.shape):
         columns[index] = lift(graph, objects.reshape(columns.shape)[index])
@@ -159,18 +157,14 @@ def norm(x: Any, ord: Any = None, axis: int | None = None, keepdims: bool = Fals
         for entry in entries[1:]:
             largest = functions.maximum(largest, abs(entry))
         return largest
-    raise ModegraphError(
-        f"np.linalg.norm with ord={ord!r} of traced values is not supported; write the norm out"
-    )
+    raise ModegraphError(f"np.linalg.norm with ord={ord!r} of traced values is not supported; write the norm out")
 
 
 def cross(a: Any, b: Any) -> Any:
     """Cross product of two vectors of three entries."""
     p, q = nested(a), nested(b)
     if p.shape != (3,) or q.shape != (3,):
-        raise ModegraphError(
-            f"np.cross of traced values needs two vectors of 3 entries, got {p.shape} and {q.shape}"
-        )
+        raise ModegraphError(f"np.cross of traced values needs two vectors of 3 entries, got {p.shape} and {q.shape}")
     result = np.empty(3, dtype=object)
     for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
         result[k] = p[i] * q[j] - p[j] * q[i]

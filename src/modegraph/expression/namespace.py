@@ -23,9 +23,7 @@ from modegraph.expression.array import TracedArray, is_traced, nested, wrap
 from modegraph.expression.arrayfunctions import HANDLERS, PASSED, filled
 from modegraph.expression.ufuncs import BINARY, UNARY
 
-_LIBRARIES = frozenset(
-    ("numpy", "scipy", "numba", "modegraph", "flint", "matplotlib", "sympy", "pandas", "llvmlite")
-)
+_LIBRARIES = frozenset(("numpy", "scipy", "numba", "modegraph", "flint", "matplotlib", "sympy", "pandas", "llvmlite"))
 _FLOATS = (None, float, np.float64, object, "float", "float64", "d")
 
 
@@ -69,10 +67,7 @@ def _holds_arrays(value: Any) -> bool:
 
 def _creating(original: Callable[..., Any], value: float) -> Callable[..., Any]:
     def create(shape: Any, dtype: Any = None, *args: Any, **kwargs: Any) -> Any:
-        if (
-            any(dtype is kind or (isinstance(kind, str) and dtype == kind) for kind in _FLOATS)
-            or dtype == np.float64
-        ):
+        if any(dtype is kind or (isinstance(kind, str) and dtype == kind) for kind in _FLOATS) or dtype == np.float64:
             return filled(shape, value)
         return original(shape, dtype, *args, **kwargs)
 

@@ -172,12 +172,8 @@ class Field:
         else:
             keys = {*a.powers, *b.powers}
             powers = {k: max(a.powers.get(k, 0), b.powers.get(k, 0)) for k in keys}
-            left = self._times(
-                a.numerator, self.product({k: e - a.powers.get(k, 0) for k, e in powers.items()})
-            )
-            right = self._times(
-                b.numerator, self.product({k: e - b.powers.get(k, 0) for k, e in powers.items()})
-            )
+            left = self._times(a.numerator, self.product({k: e - a.powers.get(k, 0) for k, e in powers.items()}))
+            right = self._times(b.numerator, self.product({k: e - b.powers.get(k, 0) for k, e in powers.items()}))
             total = Form(left + right if sign > 0 else left - right, powers)
         if len(total.numerator) > TERMS:
             raise TooBig
@@ -197,11 +193,7 @@ class Field:
 
     def scale(self, a: Form, k: Fraction) -> Form:
         """k * a."""
-        return (
-            Form(a.numerator * self._flint.fmpq(k.numerator, k.denominator), a.powers)
-            if k
-            else self.constant(ZERO)
-        )
+        return Form(a.numerator * self._flint.fmpq(k.numerator, k.denominator), a.powers) if k else self.constant(ZERO)
 
     def reciprocal(self, a: Form, node: int | None = None) -> Form:
         """1 / a. `node` is the reciprocal in the graph, to be used again when the form is written out."""
@@ -280,9 +272,7 @@ class Field:
         groups: dict[tuple[int, ...], Any] = {}
         for monomial, coefficient in p.to_dict().items():
             outer = tuple(0 if k in inner else e for k, e in enumerate(monomial))
-            groups.setdefault(outer, {})[tuple(e if k in inner else 0 for k, e in enumerate(monomial))] = (
-                coefficient
-            )
+            groups.setdefault(outer, {})[tuple(e if k in inner else 0 for k, e in enumerate(monomial))] = coefficient
         if len(groups) > 1:
             quotient, rest = p - p, p - p
             for outer, terms in groups.items():

@@ -51,9 +51,7 @@ def exact(value: object) -> Fraction | None:
     """
     if isinstance(value, (float, np.floating)):
         if not math.isfinite(value):
-            raise ModegraphError(
-                f"the constant {float(value)} is not finite; check the expression it comes from"
-            )
+            raise ModegraphError(f"the constant {float(value)} is not finite; check the expression it comes from")
         return Fraction(*value.as_integer_ratio())
     if isinstance(value, (bool, np.bool_, np.integer)):
         return Fraction(int(value))
@@ -218,9 +216,7 @@ class Expr:
     def _operand(self, other: object) -> int | None:
         if isinstance(other, Expr):
             if other.graph is not self.graph:
-                raise ModegraphError(
-                    f"{other.text()} was traced in another call; keep no traced values in globals"
-                )
+                raise ModegraphError(f"{other.text()} was traced in another call; keep no traced values in globals")
             return other.index
         value = exact(other)
         return None if value is None else self.graph.number(value)
@@ -334,19 +330,13 @@ class Expr:
         )
 
     def __int__(self) -> int:
-        raise ModegraphError(
-            f"the traced value {self.text(40)} cannot become an integer; it has no fixed value"
-        )
+        raise ModegraphError(f"the traced value {self.text(40)} cannot become an integer; it has no fixed value")
 
     def __complex__(self) -> complex:
-        raise ModegraphError(
-            f"the traced value {self.text(40)} cannot become complex; only real functions are traced"
-        )
+        raise ModegraphError(f"the traced value {self.text(40)} cannot become complex; only real functions are traced")
 
     def __index__(self) -> int:
-        raise ModegraphError(
-            f"the traced value {self.text(40)} cannot be used as an index; use np.where to choose"
-        )
+        raise ModegraphError(f"the traced value {self.text(40)} cannot be used as an index; use np.where to choose")
 
     def _refuse_rounding(self, *_: object) -> NoReturn:
         raise ModegraphError(

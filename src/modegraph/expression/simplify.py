@@ -180,11 +180,7 @@ def simplify(exprs: Sequence[Expr], *, seconds: float = 1.0) -> Simplified:
     order = graph.reachable(roots + forgotten)
     passes = []
     for reduce in (False, True) if _has_relations(graph, order) else (False,):
-        limit = (
-            deadline
-            if reduce
-            else time.monotonic() + seconds * (0.6 if _has_relations(graph, order) else 1.0)
-        )
+        limit = deadline if reduce else time.monotonic() + seconds * (0.6 if _has_relations(graph, order) else 1.0)
         passes.append(_Pass(graph, order, reduce=reduce, deadline=limit))
     candidates = [roots] + [[p.settle(k) for k in roots] for p in passes]
     chosen = _cheapest(graph, candidates)
@@ -217,9 +213,7 @@ def _cheapest(graph: Graph, candidates: list[list[int]]) -> list[int]:
     return best
 
 
-def _obligations(
-    graph: Graph, order: list[int], passes: list[_Pass], chosen: list[int], result: Simplified
-) -> None:
+def _obligations(graph: Graph, order: list[int], passes: list[_Pass], chosen: list[int], result: Simplified) -> None:
     """Fill in what the originals needed to be defined and the result does not mention."""
     kept = set(graph.reachable(chosen))
     seen: set[tuple[Kind, int]] = set()
@@ -257,11 +251,7 @@ def _obligation(
         if graph.signs[version] == POSITIVE:
             return
         note = graph.notes.get(index)
-        guard = (
-            graph.coefficient(graph.recip(version, note))[0]
-            if kind == "nonzero"
-            else graph.log(version, note)
-        )
+        guard = graph.coefficient(graph.recip(version, note))[0] if kind == "nonzero" else graph.log(version, note)
         if guard in kept or (kind, guard) in seen or graph.value(guard) is not None:
             return
         guards[version] = guard

@@ -80,9 +80,7 @@ def _bound_names(fn: Function) -> set[str]:
     return names
 
 
-def arguments(
-    fn: Function, available: Mapping[str, Any], *, role: str, owner: str
-) -> tuple[list[Any], dict[str, Any]]:
+def arguments(fn: Function, available: Mapping[str, Any], *, role: str, owner: str) -> tuple[list[Any], dict[str, Any]]:
     """Choose from `available` what the function reads, by name.
 
     A parameter with a default keeps it unless its name is available; keywords bound by a partial stay.
@@ -176,9 +174,7 @@ def _expected(length: int | None) -> str:
 def _entry(item: Any, where: str, graph: Graph) -> Expr:
     if isinstance(item, Expr):
         if item.graph is not graph:
-            raise ModegraphError(
-                f"{where}: {item.text(40)} was traced in another call; keep no traced values"
-            )
+            raise ModegraphError(f"{where}: {item.text(40)} was traced in another call; keep no traced values")
         return item
     if isinstance(item, Relation):
         raise ModegraphError(f"{where} is the relation {item.text(40)}, not a number")

@@ -74,9 +74,7 @@ def lift(graph: Graph, value: Any) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Relation):
-        raise ModegraphError(
-            f"the relation {value.text()} is used as a number; use np.where(condition, 1, 0)"
-        )
+        raise ModegraphError(f"the relation {value.text()} is used as a number; use np.where(condition, 1, 0)")
     return graph.constant(value)
 
 

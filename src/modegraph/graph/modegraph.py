@@ -116,9 +116,7 @@ class ModeGraph:
             For an unknown mode or reference, or a Target, in which no controller runs.
         """
         name = self._running(self.name_of(i), "there is nothing to check in it")
-        return every_member(
-            [(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)]
-        )
+        return every_member([(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)])
 
     def explain(self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None) -> Explanation:
         """The verdict on i -> j told in words: reason, figures, counterexample."""
@@ -314,9 +312,7 @@ class ModeGraph:
     @cached_property
     def _algorithm_1(self) -> tuple[tuple[Submode, ...], tuple[Edge, ...]]:
         def verdicts(switch: Switch, cell: Cell) -> list[Case]:
-            nodes = [
-                ((switch.source, a), (switch.target, b)) for a in cell.source_index for b in cell.target_index
-            ]
+            nodes = [((switch.source, a), (switch.target, b)) for a in cell.source_index for b in cell.target_index]
             return [(self.parameter(s), self.parameter(t), self._verdicts[s, t]) for s, t in nodes]
 
         submodes, edges = algorithm_1(self.switches, verdicts)

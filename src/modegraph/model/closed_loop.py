@@ -249,9 +249,7 @@ class _Trace:
         except ModegraphError as error:
             if "read-only" not in str(error):
                 raise
-            raise ModegraphError(
-                f"{error}; arguments must not be changed in place, begin with x = x.copy()"
-            ) from error
+            raise ModegraphError(f"{error}; arguments must not be changed in place, begin with x = x.copy()") from error
 
     def _keep_obligations(self, written: Sequence[Expr], resolved: Sequence[Expr]) -> None:
         """``maximum(t - 1, 0) / x[0]`` is 0 before t = 1, but only where x[0] is not."""

@@ -73,8 +73,7 @@ class Mode:
                 require_callable(function, f"{self.label}: {role}")
         if not isinstance(start, Set) and not callable(start):
             raise ModegraphError(
-                f"{self.label}: start must be a set or a function of r that returns one, "
-                f"got {type(start).__name__}"
+                f"{self.label}: start must be a set or a function of r that returns one, got {type(start).__name__}"
             )
         shared = [z for z in (memory.states if memory else ()) if z in system.states]
         if shared:

@@ -13,9 +13,7 @@ from modegraph.model.reference import Floats
 from modegraph.model.sets import Set
 
 
-def call_numeric(
-    function: Callable[..., Any], available: Mapping[str, object], *, role: str, owner: str
-) -> Any:
+def call_numeric(function: Callable[..., Any], available: Mapping[str, object], *, role: str, owner: str) -> Any:
     """Call a function with what it reads by name, untraced.
 
     Parameters
@@ -84,9 +82,7 @@ def _finite_vector(result: Any, length: int | None, where: str, x: Floats) -> Fl
     try:
         vector = np.asarray(result, dtype=float)
     except (TypeError, ValueError):
-        raise ModegraphError(
-            f"{where} returned {result!r}, not a vector of numbers; return np.array([...])"
-        ) from None
+        raise ModegraphError(f"{where} returned {result!r}, not a vector of numbers; return np.array([...])") from None
     if vector.ndim == 0 and length in (1, None):
         vector = vector.reshape(1)
     if vector.ndim != 1 or (length is not None and len(vector) != length):

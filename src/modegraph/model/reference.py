@@ -48,9 +48,7 @@ class ReferenceValue(np.ndarray[Any, Any]):
     ddot: Any
     p: Any
 
-    def __new__(
-        cls, value: ArrayLike, dot: ArrayLike, ddot: ArrayLike, p: ArrayLike | None
-    ) -> ReferenceValue:
+    def __new__(cls, value: ArrayLike, dot: ArrayLike, ddot: ArrayLike, p: ArrayLike | None) -> ReferenceValue:
         self = np.array(value, dtype=float).view(cls)
         self.dot = np.array(dot, dtype=float)
         self.ddot = np.array(ddot, dtype=float)
@@ -141,8 +139,7 @@ class Points(Sequence[Floats]):
         for k, row in enumerate(rows):
             if row.size != rows[0].size:
                 raise ModegraphError(
-                    f"Points: point {k} has {row.size} values but point 0 has {rows[0].size}; "
-                    "give all the same length"
+                    f"Points: point {k} has {row.size} values but point 0 has {rows[0].size}; give all the same length"
                 )
             for j in range(k):
                 if np.array_equal(rows[j], row):

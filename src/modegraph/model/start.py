@@ -31,8 +31,7 @@ def mode_start(mode: Mode, p: Floats | None = None) -> Set:
         start = call_numeric(mode.start, {"r": mode.reference.at(0.0, known)}, role="start", owner=owner)
     if not isinstance(start, Set):
         raise ModegraphError(
-            f"{owner}: start must return a set (Box, Ball, Ellipsoid, Zonotope or Polytope), "
-            f"got {type(start).__name__}"
+            f"{owner}: start must return a set (Box, Ball, Ellipsoid, Zonotope or Polytope), got {type(start).__name__}"
         )
     n, k = mode.system.n, mode.k
     if start.dim != n and not (k and start.dim == n + k):
@@ -43,11 +42,8 @@ def mode_start(mode: Mode, p: Floats | None = None) -> Set:
         )
     if start.is_empty():
         raise ModegraphError(
-            f"{owner}: the start set is empty, so everything would be true of it; "
-            "correct the faces of its Polytope"
+            f"{owner}: the start set is empty, so everything would be true of it; correct the faces of its Polytope"
         )
     if not start.is_bounded():
-        raise ModegraphError(
-            f"{owner}: the start set is unbounded; add faces to its Polytope that bound every state"
-        )
+        raise ModegraphError(f"{owner}: the start set is unbounded; add faces to its Polytope that bound every state")
     return start

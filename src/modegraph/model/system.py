@@ -60,8 +60,7 @@ class System:
         self.inputs = names_of(inputs, "u", f"{what}: inputs")
         if disturbance is not None and not isinstance(disturbance, Box):
             raise ModegraphError(
-                f"{what}: disturbance must be a Box of the values it may take, "
-                f"got {type(disturbance).__name__}"
+                f"{what}: disturbance must be a Box of the values it may take, got {type(disturbance).__name__}"
             )
         self.disturbance = disturbance
         self.unknowns: Mapping[str, tuple[float, float]] = MappingProxyType(_unknowns(unknowns or {}, what))
@@ -115,8 +114,7 @@ class System:
     def unknown_centres(self) -> dict[str, float]:
         """The middle of every unknown constant, inside its bounds."""
         return {
-            name: min(max(float((Fraction(lo) + Fraction(hi)) / 2), lo), hi)
-            for name, (lo, hi) in self.unknowns.items()
+            name: min(max(float((Fraction(lo) + Fraction(hi)) / 2), lo), hi) for name, (lo, hi) in self.unknowns.items()
         }
 
     def __repr__(self) -> str:
@@ -132,9 +130,7 @@ class AffineDynamics:
         self._reads = {"f": _reads(f, f"{what}: f"), "g": _reads(g, f"{what}: g")}
         for part, names in self._reads.items():
             if "u" in names:
-                raise ModegraphError(
-                    f"{what}: {part} may read x, w and d, but not u; the input enters as g @ u"
-                )
+                raise ModegraphError(f"{what}: {part} may read x, w and d, but not u; the input enters as g @ u")
         order = dict.fromkeys([*self._reads["f"], *self._reads["g"], "u"])
         self.__signature__ = inspect.Signature(
             [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in order]
@@ -166,8 +162,7 @@ def _reads(function: Callable[..., Any], what: str) -> tuple[str, ...]:
     for parameter in parameters:
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD, parameter.POSITIONAL_ONLY):
             raise ModegraphError(
-                f"{what} must name what it reads (x, w, d), "
-                "without *args, **kwargs or positional-only arguments"
+                f"{what} must name what it reads (x, w, d), without *args, **kwargs or positional-only arguments"
             )
         if parameter.default is parameter.empty or parameter.name in ("x", "u", "w", "d"):
             names.append(parameter.name)
@@ -190,9 +185,7 @@ def _unknowns(given: Mapping[str, tuple[float, float]], what: str) -> dict[str, 
         try:
             lo, hi = (float(value) for value in bounds)
         except (TypeError, ValueError):
-            raise ModegraphError(
-                f"{what}: unknown {name!r} must be a pair (lo, hi), got {bounds!r}"
-            ) from None
+            raise ModegraphError(f"{what}: unknown {name!r} must be a pair (lo, hi), got {bounds!r}") from None
         if not (math.isfinite(lo) and math.isfinite(hi)):
             raise ModegraphError(f"{what}: unknown {name!r} has bounds ({lo}, {hi}); both must be finite")
         if lo > hi:

@@ -21,8 +21,7 @@ class Target:
         self.name = require_name(name, "Target: name")
         if not isinstance(set, Set):
             raise ModegraphError(
-                f"target {name!r}: set must be a Box, Ball, Ellipsoid, Zonotope or Polytope, "
-                f"got {type(set).__name__}"
+                f"target {name!r}: set must be a Box, Ball, Ellipsoid, Zonotope or Polytope, got {type(set).__name__}"
             )
         if set.is_empty():
             raise ModegraphError(f"target {name!r}: the set is empty, so nothing can reach it; widen it")

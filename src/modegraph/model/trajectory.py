@@ -107,8 +107,7 @@ class Trajectory(Reference):
             time = graph.variable("t")
             pieces = self.pieces(graph, time, self.parameters()[index], "trajectory")
             self._tables[index] = [
-                (piece, Evaluator(compile_tape([*piece.value, *piece.dot, *piece.ddot], [time])))
-                for piece in pieces
+                (piece, Evaluator(compile_tape([*piece.value, *piece.dot, *piece.ddot], [time]))) for piece in pieces
             ]
         return self._tables[index]
 
@@ -164,8 +163,7 @@ def trajectory(
     for instant in instants:
         if not 0.0 <= instant <= length:
             raise ModegraphError(
-                f"trajectory: breakpoint {instant} lies outside [0, duration] = [0, {length}]; "
-                "drop it or correct it"
+                f"trajectory: breakpoint {instant} lies outside [0, duration] = [0, {length}]; drop it or correct it"
             )
     inside = tuple(sorted({instant for instant in instants if 0.0 < instant < length}))
     return Trajectory(signal, length, over, inside)

@@ -47,13 +47,9 @@ def validate_modes(modes: Iterable[Mode | Target]) -> tuple[Mode | Target, ...]:
 
 def _listed(modes: Any) -> tuple[Mode | Target, ...]:
     if isinstance(modes, Mode | Target):
-        raise ModegraphError(
-            f"expected a list of modes, got one {type(modes).__name__}; put it in a list: [mode]"
-        )
+        raise ModegraphError(f"expected a list of modes, got one {type(modes).__name__}; put it in a list: [mode]")
     if isinstance(modes, str | Mapping) or not isinstance(modes, Iterable):
-        raise ModegraphError(
-            f"expected a list of modes, got {type(modes).__name__}; pass [mode_1, mode_2, ...]"
-        )
+        raise ModegraphError(f"expected a list of modes, got {type(modes).__name__}; pass [mode_1, mode_2, ...]")
     listed = tuple(modes)
     if not listed:
         raise ModegraphError("the list of modes is empty; give at least one Mode")
@@ -69,9 +65,7 @@ def _require_unique_names(modes: Sequence[Mode | Target]) -> None:
     seen: set[str] = set()
     for mode in modes:
         if mode.name in seen:
-            raise ModegraphError(
-                f"two modes are called {mode.name!r}; give every mode and target its own name"
-            )
+            raise ModegraphError(f"two modes are called {mode.name!r}; give every mode and target its own name")
         seen.add(mode.name)
 
 
@@ -83,6 +77,5 @@ def _require_same_states(modes: Sequence[Mode]) -> None:
             raise ModegraphError(
                 f"mode {mode.name!r} has the states {', '.join(mode.system.states)} but mode "
                 f"{first.name!r} has {', '.join(first.system.states)}; all modes share the same "
-                "states"
-                + (" in the same order" if same else " (dynamics, inputs and disturbance may differ)")
+                "states" + (" in the same order" if same else " (dynamics, inputs and disturbance may differ)")
             )

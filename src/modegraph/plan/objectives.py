@@ -81,9 +81,7 @@ def _weighted(weights: Mapping[Any, Any]) -> Objective:
     exact = {}
     for what, weight in weights.items():
         if what not in WEIGHED:
-            raise ModegraphError(
-                f"plan: minimize cannot weigh {what!r}; weights are for {', '.join(WEIGHED)}"
-            )
+            raise ModegraphError(f"plan: minimize cannot weigh {what!r}; weights are for {', '.join(WEIGHED)}")
         number = float(weight) if isinstance(weight, Real) and not isinstance(weight, bool) else math.nan
         if not 0 <= number < math.inf:
             raise ModegraphError(f"plan: the weight of {what!r} must be a finite number >= 0, not {weight!r}")

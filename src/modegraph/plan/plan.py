@@ -98,9 +98,7 @@ class Plan:
             graph=graph,
         )
 
-    def simulate(
-        self, x0: Any = None, plant: Any = None, force: bool = False, *, stay: float | None = None
-    ) -> Run:
+    def simulate(self, x0: Any = None, plant: Any = None, force: bool = False, *, stay: float | None = None) -> Run:
         """Integrate the real closed loop with its switching logic; see ``modegraph.run.simulate``.
 
         Parameters
@@ -158,9 +156,7 @@ class Plan:
                 + ("" if s.margin is None else f", margin {s.margin:.3g}")
                 + ("" if s.energy is None else f", energy <= {s.energy:.4g}")
             )
-        lines.append(
-            f"  in {self.modes[-1]!r} between {self.time[0]:.4g} and {self.time[1]:.4g} s, certified"
-        )
+        lines.append(f"  in {self.modes[-1]!r} between {self.time[0]:.4g} and {self.time[1]:.4g} s, certified")
         if self.energy is not None:
             lines.append(f"  energy at most {self.energy:.4g}")
         lines += [f"  warning: {w}" for w in self.warnings]

@@ -163,9 +163,7 @@ def _spurs(problem: Problem, path: Path, found: Sequence[Path]) -> list[Path]:
     root = start_path(problem, path.states[0][0])
     for i, arc in enumerate(path.arcs):
         closed = frozenset(
-            (root.states[-1], p.arcs[i])
-            for p in found
-            if len(p.arcs) > i and p.states[: i + 1] == root.states
+            (root.states[-1], p.arcs[i]) for p in found if len(p.arcs) > i and p.states[: i + 1] == root.states
         )
         spur = _best(problem, [root], frozenset(root.states), closed)
         if spur is not None:

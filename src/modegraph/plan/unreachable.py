@@ -29,9 +29,7 @@ def unreachable(graph: ModeGraph, problem: Problem, start: str | None, goal: str
     reached = {state[0][0] for (state, _), needed in fewest.items() if needed == 0}
     reachable = [name for name in graph.modes if name in reached]
     helpful = _helpful(graph, problem, moves, fewest)
-    return Unreachable(
-        _message(problem, start, goal, reachable, helpful), reachable=reachable, helpful=helpful
-    )
+    return Unreachable(_message(problem, start, goal, reachable, helpful), reachable=reachable, helpful=helpful)
 
 
 class _Moves:
@@ -81,9 +79,7 @@ class _Moves:
         return best
 
 
-def _helpful(
-    graph: ModeGraph, problem: Problem, moves: _Moves, fewest: dict[Step, int]
-) -> list[tuple[str, str]]:
+def _helpful(graph: ModeGraph, problem: Problem, moves: _Moves, fewest: dict[Step, int]) -> list[tuple[str, str]]:
     ends = {step: needed for step, needed in fewest.items() if problem.accepts(step[0])}
     if not ends:
         return []
@@ -122,9 +118,7 @@ def _message(
         conditions.append(f"with at most {problem.max_switches} switches")
     origin = "x0" if start is None else repr(start)
     asked = "".join(f" {c}" for c in conditions)
-    text = (
-        f"no chain of certified switches from {origin} to {goal!r}{asked}; reachable: {', '.join(reachable)}"
-    )
+    text = f"no chain of certified switches from {origin} to {goal!r}{asked}; reachable: {', '.join(reachable)}"
     if helpful:
         return text + "; undecided pairs that would help: " + ", ".join(f"{i} -> {j}" for i, j in helpful)
     return text + "; no undecided pair could help"

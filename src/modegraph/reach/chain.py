@@ -16,7 +16,7 @@ from .start import Piece
 
 WIDE_GAP = 8.0
 """Ratio of the fastest to the slowest mode from which the frame of the modes is used at once."""
-RESTARTED, CHEAP, MOST_RESTARTED = Order(4, 3), Order(3, 2), 330
+RESTARTED, CHEAP, MOST_RESTARTED = Order(4, 3), Order(3, 2), 500
 """Degrees after a restart, if that makes at most so many monomials, or else."""
 
 
@@ -54,7 +54,8 @@ class Chain:
         flow = self.flows[-1]
         in_modes = len(self.flows) > 1 or mode_gap(flow.slope) > WIDE_GAP
         fields = self.framed if in_modes else self.compiled.fields
-        variables = len(self.compiled.loop.states) + len(self.piece.uncertain)
+        n, free = len(self.compiled.loop.states), flow.piece.chart.free
+        variables = n + (free if free <= n else 0) + len(self.piece.uncertain)
         order = RESTARTED if math.comb(variables + RESTARTED.degree, variables) <= MOST_RESTARTED else CHEAP
         following = restarted([flow], fields, order)
         if following is None or flow.time >= end or not following.advance(end):

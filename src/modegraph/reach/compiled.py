@@ -79,9 +79,7 @@ def compile_reset(loop: ClosedLoop) -> Tape | None:
     return compile_tape(loop.reset, loop.states[: len(loop.states) - len(loop.reset)])
 
 
-def compile_mode(
-    mode: Mode, p: Floats | None, start: Set | None = None, *, observed: bool = True
-) -> CompiledMode:
+def compile_mode(mode: Mode, p: Floats | None, start: Set | None = None, *, observed: bool = True) -> CompiledMode:
     """Trace and compile a mode; raises `ModegraphError` where the model is wrong.
 
     Without ``observed``, the states alone are followed: no constraints, inputs or tracking errors.
@@ -90,7 +88,7 @@ def compile_mode(
     if not observed:
         bare = [replace(segment, constraints=[], inputs=[], tracking=[]) for segment in loop.segments]
         loop = replace(loop, segments=bare)
-    centre, radius = disturbance_box(loop, mode.system.disturbance)
+    centre, radius = disturbance_box(mode.system.disturbance)
     unknowns = {name: (float(lo), float(hi)) for name, (lo, hi) in (mode.system.unknowns or {}).items()}
     return CompiledMode(
         loop=loop,

@@ -17,6 +17,7 @@ from ..expression.scalar import Expr, Graph
 from ..expression.simplify import simplify
 from ..expression.tape import Tape, compile_tape
 from ..model.closed_loop import ClosedLoop, Segment
+from ..model.sets.box import Box
 from ..model.sets.exact import inverse, matrix
 
 SIMPLIFY_SECONDS = 1.0
@@ -233,21 +234,18 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         full_w=bool(nw) and not affine,
         autonomous=not any(e.depends_on([loop.time]) for e in [*rates, *faces, *unique]),
         reads=tuple(frozenset(k for k in range(n) if rate.depends_on([states[k]])) for rate in rates),
-        observed_states=frozenset(
-            k for k in range(n) if any(e.depends_on([states[k]]) for e in [*faces, *unique])
-        ),
+        observed_states=frozenset(k for k in range(n) if any(e.depends_on([states[k]]) for e in [*faces, *unique])),
     )
 
 
-def disturbance_box(loop: ClosedLoop, box: object | None) -> tuple[np.ndarray, np.ndarray]:
+def disturbance_box(box: Box | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centre and half-widths (q,) of the disturbance set, rounded so that they cover it."""
     if box is None:
         return np.zeros(0), np.zeros(0)
-    lo, hi = np.asarray(box.lo, float), np.asarray(box.hi, float)  # type: ignore[attr-defined]
-    return cover(lo, hi)
+    return cover(np.asarray(box.lo, float), np.asarray(box.hi, float))
 
 
-def cover(lo: np.ndarray, hi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cover(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centre c and radius r (float arrays) with [lo, hi] inside [c - r, c + r] exactly."""
     centre = np.where(lo == hi, lo, 0.5 * lo + 0.5 * hi)
     radius = np.maximum(hi - centre, centre - lo)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,18 +13,19 @@ from ..enclosure.observe import enclose_at, observe_step
 from ..enclosure.rounding import UNIT
 from ..enclosure.step import (
     DONE,
-    DROPPED,
     JACOBIAN_UNDEFINED,
     NO_CONTRACTION,
     NO_GROWTH_BOUND,
-    SET_VARIABLE,
     UNDEFINED,
     flow_step,
 )
 from ..expression.tape import Tape
 from .bounds import PolynomialBounds
-from .field import Field, Frame
+from .error_table import error_table
+from .field import Field
+from .framing import generator_box, into_frame, out_of_frame
 from .grid import next_instant
+from .records import Failure, Order, Step
 from .start import Piece
 
 Floats = NDArray[np.float64]
@@ -57,49 +56,6 @@ SMALLEST_STEP = 1e-7
 """A flowpipe stops when its step falls below this part of the time scale of the loop."""
 
 
-@dataclass(frozen=True)
-class Order:
-    """Degrees of the flowpipe: ``degree`` of p and ``jacobian`` of Psi and G in the set variables."""
-
-    degree: int
-    jacobian: int
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why a flowpipe cannot go on: at what time, which mechanism, where, and what would help."""
-
-    time: float
-    mechanism: str
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"at t = {self.time:.6g} s {self.mechanism}; {self.remedy}"
-
-
-@dataclass
-class Step:
-    """One step, from ``start`` to ``end`` seconds.
-
-    p (n, N), G (ng, n, Nq): the set at the end. ``tube`` (n,) bounds e over the step, ``bend`` (n,)
-    the distance of p from its chord. ``face_upper``: proved upper bound of each constraint face over
-    the whole closed step (inf: not proved). ``energy``: polynomial of int u'u since entry, and its
-    radius. ``tracking``: upper bounds of |h(x) - r|.
-    """
-
-    start: float
-    end: float
-    p: Floats
-    G: Floats
-    tube: Floats
-    bend: Floats
-    face_upper: Floats
-    energy: Floats
-    energy_radius: float
-    tracking: Floats
-    segment: int
-
-
 def _workspace(tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
     rows = tape.size
     return {
@@ -110,39 +66,6 @@ def _workspace(tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
         "kinks": np.zeros((rows, 2)),
         "ranges": np.full((rows, 2), np.nan),
     }
-
-
-@dataclass(frozen=True)
-class ErrorTable:
-    """The table of the Jacobian: set variables, and one more variable for the error of each state.
-
-    ``embed``, ``owner`` and ``variables`` are as ``flow_step`` takes them.
-    """
-
-    table: Monomials
-    embed: NDArray[np.int64]
-    owner: NDArray[np.int64]
-    variables: NDArray[np.int64]
-
-
-@lru_cache(maxsize=64)
-def _error_table(m: int, q: int, n: int) -> ErrorTable:
-    order = max(q, 1)
-    table = monomials((1,) * m + (1 if order <= 3 else 2,) * n, order)
-    owner = np.full(table.size, SET_VARIABLE, np.int64)
-    owner[table.degree > q] = DROPPED
-    for v in range(n):
-        owner[table.exponents[:, m + v] > 0] = v
-    plain = monomials((1,) * m, order)
-    index = {tuple(e): k for k, e in enumerate(table.exponents.tolist())}
-    count = int(plain.start[q + 1])
-    embed = np.array([index[(*e, *(0,) * n)] for e in plain.exponents[:count].tolist()], np.int64)
-    return ErrorTable(table, embed, owner, table.linear[m:].copy())
-
-
-def error_table(table: Monomials, q: int, n: int) -> ErrorTable:
-    """The Jacobian's table for a flowpipe over ``table`` with Psi and G of degree q, n states."""
-    return _error_table(table.variables, q, n)
 
 
 class Flow:
@@ -313,24 +236,30 @@ class Flow:
             status, node, p, G, tube, bend, rest, control = outcome
             scale = TOLERANCE * (1.0 + np.abs(self._p[:, 0]).max())
             if status == DONE and np.isfinite(control).all():
-                rate = control[0] / h
-                floor = max(scale, 0.3 * control[1] / h)
+                rate, floor = control[0] / h, max(scale, 0.3 * control[1] / h)
                 factor = 1.6 if rate <= 0.0 else min(1.6, max(0.3, 0.9 * (floor / rate) ** (1.0 / TIME_DEGREE)))
                 if rate > 4.0 * floor and h > 1e-4:
                     h_try = h * min(0.8, factor)
                     continue
-                caps = min((cap / value for value, cap in ((control[2], GROWTH_CAP), (control[3], self._rate_cap(fld))) if value > 0.0), default=1.6)
+                caps = min(
+                    (
+                        cap / value
+                        for value, cap in ((control[2], GROWTH_CAP), (control[3], self._rate_cap(fld)))
+                        if value > 0.0
+                    ),
+                    default=1.6,
+                )
                 if caps < 0.5 and h > 1e-4:
                     h_try = h * caps
                     continue
                 factor = min(factor, caps)
                 seen = self._observe(fld, h, tube)
-                if shortened < SHORTER_LOOKS and not (seen[0] <= 0.0).all() and h > 1e-6:
-                    # Between the ends a constraint is bounded through its bend: try a shorter look.
-                    if (self.faces_at(t1, p, G, self.segment) <= 0.0).all():
-                        shortened += 1
-                        h_try = 0.25 * h
-                        continue
+                look = shortened < SHORTER_LOOKS and h > 1e-6 and not (seen[0] <= 0.0).all()
+                # Between the ends a constraint is bounded through its bend: try a shorter look.
+                if look and (self.faces_at(t1, p, G, self.segment) <= 0.0).all():
+                    shortened += 1
+                    h_try = 0.25 * h
+                    continue
                 self.h = h * max(0.1, factor) if h > 0.5 * h_try else h_try
                 break
             h_try = 0.4 * h
@@ -409,9 +338,7 @@ class Flow:
         rounding = 4.0 * UNIT * float(np.abs(self._energy).sum() + h * np.abs(mean).sum())
         self._energy_radius = (self._energy_radius + h * mean_radius + rounding) * (1.0 + 8.0 * UNIT)
         self.steps.append(
-            Step(
-                self.time, t1, p, G, tube, bend, face_upper, self._energy, self._energy_radius, tracking, self.segment
-            )
+            Step(self.time, t1, p, G, tube, bend, face_upper, self._energy, self._energy_radius, tracking, self.segment)
         )
         self._p, self._G, self._ebox, self.time = p, G, tube, t1
         if t1 >= fld.end:
@@ -468,10 +395,13 @@ class Flow:
             what = f"a function leaves its domain: {fld.rates.labels[node]}"
             help_ = "keep the starts away from there, or shrink the start set"
         elif status == JACOBIAN_UNDEFINED:
-            what = f"a function of the loop is not defined, or not continuous, on the whole set: {fld.jacobian.labels[node]}"
+            what = (
+                "a function of the loop is not defined, or not continuous, on the whole set: "
+                f"{fld.jacobian.labels[node]}"
+            )
             help_ = "keep the starts away from there, or shrink the start set"
         elif status == NO_GROWTH_BOUND:
-            what = f"the error bound cannot be closed for any step (state '{worst}' is the widest): the set has grown too far"
+            what = f"the error bound cannot be closed (state '{worst}' is the widest): the set has grown too far"
             help_ = "shrink or split the start set, or shorten the horizon"
         else:
             what = f"the remainder does not contract (state '{worst}' is the widest)"
@@ -550,26 +480,3 @@ class Flow:
         below = np.minimum(lo[:-1], lo[1:]) - out
         above = np.maximum(hi[:-1], hi[1:]) + out
         return np.nextafter(below, -np.inf), np.nextafter(above, np.inf)
-
-
-def into_frame(frame: Frame, p: Floats, slack: Floats) -> tuple[Floats, Floats]:
-    """Polynomials V^-1 p and a box (n,) for V^-1 of the old box and what rounding loses."""
-    size = np.abs(frame.inverse) @ (np.abs(p).sum(axis=1) + slack)
-    count = p.shape[0] + p.shape[1] + 8
-    return frame.inverse @ p, np.abs(frame.inverse) @ slack * (1.0 + 1e-12) + 4.0 * count * UNIT * size
-
-
-def out_of_frame(frame: Frame, p: Floats, G: Floats) -> tuple[Floats, Floats]:
-    """V p and V G; what rounding loses is appended as axis generators."""
-    n = len(p)
-    size = np.abs(frame.V) @ (np.abs(p).sum(axis=1) + generator_box(G))
-    out = np.zeros((len(G) + n, n, G.shape[2]))
-    out[: len(G)] = np.einsum("ij,gjk->gik", frame.V, G)
-    out[len(G) + np.arange(n), np.arange(n), 0] = 4.0 * (p.shape[1] + G.shape[0] * G.shape[2] + n + 8) * UNIT * size
-    return frame.V @ p, out
-
-
-def generator_box(G: Floats) -> Floats:
-    """Radii (n,) of a box around sum_g G_g(xi) zeta_g, rounded up."""
-    count = G.shape[0] * G.shape[2]
-    return np.asarray(np.abs(G).sum(axis=(0, 2)) * (1.0 + (count + 4) * UNIT * 2.0))

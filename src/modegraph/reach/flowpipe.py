@@ -57,9 +57,7 @@ class Flowpipe:
         Names of the coordinates of the boxes: states, then memory.
     """
 
-    def __init__(
-        self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str
-    ) -> None:
+    def __init__(self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str) -> None:
         self.states = tuple(states)
         self.horizon = horizon
         self.complete = not any(chain.failure for chain in chains)
@@ -77,9 +75,7 @@ class Flowpipe:
             self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {steps} steps)"
         else:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
-            self.reason = (
-                f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
-            )
+            self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
 
     def at(self, t: float) -> Box:
         """Box over states, then memory, around every state that is possible at time t (seconds).
@@ -101,9 +97,7 @@ class Flowpipe:
         """
         a, b = self._instant(t0, "t0"), self._instant(t1, "t1")
         if a > b:
-            raise ModegraphError(
-                f"{self._label}: flowpipe.hull: t0 = {a:.6g} is after t1 = {b:.6g}; exchange them"
-            )
+            raise ModegraphError(f"{self._label}: flowpipe.hull: t0 = {a:.6g} is after t1 = {b:.6g}; exchange them")
         if (a, b) not in self._boxes:
             slices = [s for part in self._parts for s in _slices(part, a, b)]
             self._boxes[a, b] = Box(*hull(slices))
@@ -168,8 +162,7 @@ class Flowpipe:
             found.append(int(k))
         if len(found) not in (1, 2):
             raise ModegraphError(
-                f"{self._label}: flowpipe.plot: dims takes one state (over time) or two (phase plane), "
-                f"got {len(found)}"
+                f"{self._label}: flowpipe.plot: dims takes one state (over time) or two (phase plane), got {len(found)}"
             )
         return tuple(found)
 
@@ -214,9 +207,7 @@ def flowpipe(
         If the model or an argument is wrong; names the mode and the remedy.
     """
     if not isinstance(mode, Mode):
-        raise ModegraphError(
-            f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each"
-        )
+        raise ModegraphError(f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each")
     p = mode.reference.parameters()[mode.match(r)]
     if start is not None:
         mode = copy(mode)
@@ -236,9 +227,7 @@ def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
     except (TypeError, ValueError):
         end = math.nan
     if not 0.0 < end < math.inf:
-        raise ModegraphError(
-            f"{label}: flowpipe: horizon must be a positive, finite time in seconds, got {horizon!r}"
-        )
+        raise ModegraphError(f"{label}: flowpipe: horizon must be a positive, finite time in seconds, got {horizon!r}")
     return end
 
 

@@ -38,9 +38,7 @@ class Slicer:
 
     def __init__(self, flow: Flow) -> None:
         self.flow = flow
-        self.times = (
-            np.array([flow.steps[0].start, *(s.end for s in flow.steps)]) if flow.steps else np.zeros(1)
-        )
+        self.times = np.array([flow.steps[0].start, *(s.end for s in flow.steps)]) if flow.steps else np.zeros(1)
         sets = [flow.state_set(k) for k in range(len(flow.steps) + 1)]
         self.p = np.stack([p for p, _ in sets])
         self.z = np.stack([generator_box(G) for _, G in sets])
@@ -81,8 +79,7 @@ class Slicer:
         last = int(np.searchsorted(self.times, t1)) - 1
         slices = [Slice(self, self._chord(first, t0), self.swell[first])]
         slices += [
-            Slice(self, self.p[k], np.maximum(self.swell[k - 1], self.swell[k]))
-            for k in range(first + 1, last + 1)
+            Slice(self, self.p[k], np.maximum(self.swell[k - 1], self.swell[k])) for k in range(first + 1, last + 1)
         ]
         return [*slices, Slice(self, self._chord(last, t1), self.swell[last])]
 
@@ -128,9 +125,7 @@ def hull(slices: Sequence[Slice]) -> tuple[Floats, Floats]:
     return lo, hi
 
 
-def _face(
-    slices: Sequence[Slice], i: int, sign: float, quick: Sequence[float], flat: Sequence[bool]
-) -> float:
+def _face(slices: Sequence[Slice], i: int, sign: float, quick: Sequence[float], flat: Sequence[bool]) -> float:
     """The largest of sign * state i over all slices, rounded up."""
     out = [float(s.out[i]) for s in slices]
     tops = [float(np.nextafter(q + o, np.inf)) for q, o in zip(quick, out, strict=True)]

@@ -193,7 +193,7 @@ def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
     return piece
 
 
-def point(x0: Floats, unknowns: Sequence[float]) -> Piece:
+def point(x0: Floats, unknowns: Sequence[float] | Floats) -> Piece:
     """One start with known constants: no variable at all."""
     values = np.asarray(unknowns, float)
     chart = Chart(np.asarray(x0, float), np.zeros((len(x0), 0)), False, None, values, values)
@@ -222,7 +222,9 @@ def _chart(start: Set) -> tuple[Floats, Floats, bool, tuple[Floats, Floats] | No
         bound = np.array(start.b, float) - A @ centre
         faces = scaled, bound + 8.0 * (len(lo) + 4) * UNIT * (size + np.abs(start.b))
     elif not isinstance(start, Box):
-        raise ModegraphError(f"a {type(start).__name__} cannot be a start set yet; use a Box, Ball, Ellipsoid, Zonotope or Polytope")
+        raise ModegraphError(
+            f"a {type(start).__name__} cannot be a start set yet; use a Box, Ball, Ellipsoid, Zonotope or Polytope"
+        )
     return centre, axes, False, faces
 
 

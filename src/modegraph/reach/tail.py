@@ -139,7 +139,7 @@ class TailSearch:
                 continue
             size = np.maximum(widest * 1.02, FLOOR * widest.max())
             if self.w_radius.any():
-                size = np.maximum(size, self._disturbed_size(np.linalg.inv(frame), slope, centre))
+                size = np.maximum(size, self._disturbed_size(np.asarray(np.linalg.inv(frame), float), slope, centre))
             for growth in (1.0, 1.6):
                 axes = np.zeros((n, len(keep)))
                 axes[keep] = frame * (size * growth)

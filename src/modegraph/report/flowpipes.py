@@ -26,9 +26,7 @@ def plot_flowpipe(pipe: Flowpipe, ax: Any = None, dims: tuple[int, ...] | None =
     lo = np.min([below for below, _ in parts], axis=0)
     hi = np.max([above for _, above in parts], axis=0)
     for k in range(len(pipe.states)) if dims is None else dims:
-        ax.stairs(
-            hi[:, k], times, baseline=lo[:, k], fill=True, alpha=0.6, color=f"C{k % 10}", label=pipe.states[k]
-        )
+        ax.stairs(hi[:, k], times, baseline=lo[:, k], fill=True, alpha=0.6, color=f"C{k % 10}", label=pipe.states[k])
     ax.set_xlabel("time")
     if dims is None:
         ax.legend(loc="best", fontsize=8)

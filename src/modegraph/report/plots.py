@@ -65,9 +65,7 @@ def plot_plan(plan: Plan, ax: Any = None) -> Any:
         leave = (
             (earliest, latest)
             if last
-            else tuple(
-                bound + step for bound, step in zip((earliest, latest), plan.switches[row].time, strict=True)
-            )
+            else tuple(bound + step for bound, step in zip((earliest, latest), plan.switches[row].time, strict=True))
         )
         ax.barh(row, max(leave[1] - earliest, 0.0), left=earliest, height=0.5, color=_colour(row), alpha=0.35)
         ax.plot([earliest, latest], [row, row], color=_colour(row), linewidth=4, solid_capstyle="butt")
@@ -119,9 +117,7 @@ def _draw(run: Run, ax: Any, values: Any, names: Any, *, legend_modes: bool) -> 
         ax.axvspan(run.t[begin], run.t[end], color=_colour(visit), alpha=0.15, linewidth=0)
         if legend_modes:
             middle = 0.5 * (run.t[begin] + run.t[end])
-            ax.text(
-                middle, 1.01, name, transform=ax.get_xaxis_transform(), ha="center", va="bottom", fontsize=8
-            )
+            ax.text(middle, 1.01, name, transform=ax.get_xaxis_transform(), ha="center", va="bottom", fontsize=8)
     for k, name in enumerate(names):
         ax.plot(run.t, values[:, k], label=name, color=_colour(k))
     for instant in run.switch_times:

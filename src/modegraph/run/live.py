@@ -34,9 +34,7 @@ def numeric(function: Callable[..., Any], owner: str, role: str) -> Function:
         except ModegraphError:
             raise
         except Exception as error:
-            raise ModegraphError(
-                f"{owner}: the {role} failed with {type(error).__name__}: {error}"
-            ) from error
+            raise ModegraphError(f"{owner}: the {role} failed with {type(error).__name__}: {error}") from error
 
     return call
 
@@ -74,12 +72,8 @@ class Live:
         w = np.zeros(0) if system.disturbance is None else system.disturbance.center
         self._fixed: dict[str, Any] = {"w": np.array(w, dtype=float), "d": system.unknown_centres()}
         self._clocked = not (plant is None or isinstance(plant, System))
-        self._constraints = (
-            None if mode.constraints is None else numeric(mode.constraints, owner, "constraints")
-        )
-        self._memory = (
-            None if mode.memory is None else numeric(mode.memory.dynamics, owner, "memory dynamics")
-        )
+        self._constraints = None if mode.constraints is None else numeric(mode.constraints, owner, "constraints")
+        self._memory = None if mode.memory is None else numeric(mode.memory.dynamics, owner, "memory dynamics")
         duration = mode.reference.duration
         inner = [b for b in mode.reference.breakpoints if 0 < b < duration]
         self.breaks = sorted({*inner, duration} - {0.0}) if np.isfinite(duration) else sorted(inner)

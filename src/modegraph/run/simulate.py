@@ -134,12 +134,8 @@ def simulate(
     n = first.set.dim if isinstance(first, Target) else first.system.n
     x = plain_state(x0, n)
     if plant is not None and not callable(plant) and not hasattr(plant, "dynamics"):
-        raise ModegraphError(
-            f"simulate: plant must be a System or a callable(t, x, u), not {type(plant).__name__}"
-        )
-    if stay is not None and (
-        isinstance(stay, bool) or not isinstance(stay, Real) or not 0 <= stay < math.inf
-    ):
+        raise ModegraphError(f"simulate: plant must be a System or a callable(t, x, u), not {type(plant).__name__}")
+    if stay is not None and (isinstance(stay, bool) or not isinstance(stay, Real) or not 0 <= stay < math.inf):
         raise ModegraphError(f"simulate: stay must be a finite number of seconds >= 0, not {stay!r}")
     if not force and not Entry(first, references[0]).contains(x):
         raise ModegraphError(
@@ -161,9 +157,7 @@ def simulate(
                 visitor = _Visit(live, record, visit, x, limit, settle=stay is None)
             else:
                 following = Entry(modes[visit + 1], references[visit + 1])
-                visitor = _Visit(
-                    live, record, visit, x, _patience(live, times[visit][1]), following=following
-                )
+                visitor = _Visit(live, record, visit, x, _patience(live, times[visit][1]), following=following)
                 if times[visit][1] > 0:
                     visitor.longest = max(times[visit][1] / LOOKS, visitor.limit / MOST_LOOKS)
             message = visitor.run()

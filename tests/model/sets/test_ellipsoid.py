@@ -26,9 +26,7 @@ def test_axes():
 
 @given(finite, finite, st.integers(1, 8))
 def test_round_ellipsoid_is_a_ball(x, y, radius):
-    assert Ellipsoid([0, 0], np.diag([radius**2] * 2)).contains([x, y]) == Ball([0, 0], radius).contains(
-        [x, y]
-    )
+    assert Ellipsoid([0, 0], np.diag([radius**2] * 2)).contains([x, y]) == Ball([0, 0], radius).contains([x, y])
 
 
 def test_skew_samples_and_box():

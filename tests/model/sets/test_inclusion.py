@@ -62,9 +62,7 @@ def test_touching_from_inside():
     assert is_subset(Ellipsoid([1, 0], np.diag([1.0, 0.5])), Ball([0, 0], 2))
     assert is_subset(Ellipsoid([0, 0], np.diag([4.0, 1.0])), Ball([0, 0], 2))
     assert is_subset(Zonotope([0, 0], [[1, 1], [1, -1]]), Ball([0, 0], 2))
-    assert is_subset(
-        Zonotope([0, 0], [[1, 1], [1, -1]]), Polytope([[1, 1], [-1, 1], [1, -1], [-1, -1]], [2] * 4)
-    )
+    assert is_subset(Zonotope([0, 0], [[1, 1], [1, -1]]), Polytope([[1, 1], [-1, 1], [1, -1], [-1, -1]], [2] * 4))
     assert is_subset(cube(3), box(3))
     assert is_subset(box(3), cube(3))
     assert is_subset(Box([-1, -1], [1, 1]), Zonotope([0, 0], [[1, 0.5], [0, 0.5]])) is False

@@ -27,16 +27,13 @@ def test_agrees_with_highs(faces, bounds, objective):
     faces = [exact(row) for row in faces]
     result = maximise(exact(objective), faces, exact(bounds))
     empty = maximise(exact([0, 0, 0]), faces, exact(bounds)).outcome is Outcome.EMPTY
-    other = linprog(
-        -np.array(objective, float), np.array(faces, float), np.array(bounds, float), bounds=(None, None)
-    )
+    other = linprog(-np.array(objective, float), np.array(faces, float), np.array(bounds, float), bounds=(None, None))
     if other.status == 0:
         assert result.outcome is Outcome.OPTIMAL
         assert float(result.value) == pytest.approx(-other.fun, abs=1e-7)
         point = result.point
         assert all(
-            sum(a * x for a, x in zip(row, point, strict=True)) <= b
-            for row, b in zip(faces, bounds, strict=True)
+            sum(a * x for a, x in zip(row, point, strict=True)) <= b for row, b in zip(faces, bounds, strict=True)
         )
         assert sum(c * x for c, x in zip(objective, point, strict=True)) == result.value
     elif other.status == 2:

@@ -48,9 +48,7 @@ def test_faces_describe_the_set(generators, point):
     if faces is None:
         assert np.linalg.matrix_rank(np.array(generators, float)) < 3
     else:
-        inside = all(
-            sum(a * x for a, x in zip(direction, point, strict=True)) <= bound for direction, bound in faces
-        )
+        inside = all(sum(a * x for a, x in zip(direction, point, strict=True)) <= bound for direction, bound in faces)
         assert inside == zonotope.contains(point)
 
 

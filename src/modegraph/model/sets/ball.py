@@ -29,8 +29,7 @@ class Ball(Set):
         size = vector(radius, "Ball: radius")
         if size.size != 1:
             raise ModegraphError(
-                f"Ball: radius must be one number, got {size.size}; "
-                "for one per coordinate use Ellipsoid or Box"
+                f"Ball: radius must be one number, got {size.size}; for one per coordinate use Ellipsoid or Box"
             )
         self.radius = float(size[0])
         if self.radius < 0:

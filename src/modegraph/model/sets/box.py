@@ -38,8 +38,7 @@ class Box(Set):
         if inverted.size:
             k = int(inverted[0])
             raise ModegraphError(
-                f"Box: coordinate {k} is inverted: lo = {self.lo[k]} is above hi = {self.hi[k]}; "
-                "exchange them"
+                f"Box: coordinate {k} is inverted: lo = {self.lo[k]} is above hi = {self.hi[k]}; exchange them"
             )
 
     @property

@@ -81,9 +81,7 @@ def _in_quadric(inner: Set, center: exact.Row, weight: exact.Matrix) -> bool:
     if _generators_in_quadric(inner, center, weight):
         return True
     corners = inner.vertices()
-    return corners is not None and all(
-        exact.quadratic_form(weight, _minus(corner, center)) <= 1 for corner in corners
-    )
+    return corners is not None and all(exact.quadratic_form(weight, _minus(corner, center)) <= 1 for corner in corners)
 
 
 def _generators_in_quadric(inner: Set, center: exact.Row, weight: exact.Matrix) -> bool:
@@ -167,9 +165,7 @@ def _in_zonotope(inner: Set, outer: Zonotope) -> bool:
         return True
     corners = inner.vertices() or Box(*inner.bounding_box()).vertices()
     few = list(islice(corners, _FEW_CORNERS + 1)) if corners is not None else []
-    return 0 < len(few) <= _FEW_CORNERS and all(
-        outer.contains_offset(_minus(corner, center)) for corner in few
-    )
+    return 0 < len(few) <= _FEW_CORNERS and all(outer.contains_offset(_minus(corner, center)) for corner in few)
 
 
 def _minus(a: exact.Row, b: exact.Row) -> exact.Row:

@@ -34,9 +34,7 @@ class Optimum:
     point: tuple[Fraction, ...] = ()
 
 
-def maximise(
-    objective: Sequence[Fraction], faces: Sequence[Sequence[Fraction]], bounds: Sequence[Fraction]
-) -> Optimum:
+def maximise(objective: Sequence[Fraction], faces: Sequence[Sequence[Fraction]], bounds: Sequence[Fraction]) -> Optimum:
     """Maximise objective'x over {x : faces x <= bounds}, exactly.
 
     Parameters
@@ -91,9 +89,7 @@ class _Tableau:
             return Optimum(Outcome.EMPTY)
         cost = self.rows[self.n]
         value = Fraction(-cost[-1], self.denominator * scale)
-        point = tuple(
-            Fraction(-sign * cost[self.m + j], self.denominator) for j, sign in enumerate(self.signs)
-        )
+        point = tuple(Fraction(-sign * cost[self.m + j], self.denominator) for j, sign in enumerate(self.signs))
         return Optimum(Outcome.OPTIMAL, value, point)
 
     def _minimise(self, cost_row: int) -> bool:

@@ -96,8 +96,7 @@ class Polytope(Set):
         self._require_points("bounding box")
         if self._extents is None:
             raise ModegraphError(
-                "Polytope: the set is unbounded, so it has no bounding box; "
-                "add faces that bound every coordinate"
+                "Polytope: the set is unbounded, so it has no bounding box; add faces that bound every coordinate"
             )
         return (
             np.array([exact.round_down(low) for low, _ in self._extents]),
@@ -137,9 +136,7 @@ class Polytope(Set):
 
     def _require_points(self, what: str) -> None:
         if self._empty:
-            raise ModegraphError(
-                f"Polytope: the set is empty, so it has no {what}; its faces contradict each other"
-            )
+            raise ModegraphError(f"Polytope: the set is empty, so it has no {what}; its faces contradict each other")
 
     def _contains(self, x: Floats) -> bool:
         point = exact.fractions(x)

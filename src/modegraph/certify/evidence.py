@@ -1,0 +1,60 @@
+"""What a finished flow shows: slack of the constraints, where it is nonlinear, whether samples break a constraint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..expression.evaluate import Evaluator
+from ..reach.flow import Flow
+from .crossing import sample_powers, widest_variable
+from .proof import least_slack
+
+Floats = NDArray[np.float64]
+
+
+def slack_until(flow: Flow, instant: int) -> dict[str, float]:
+    """Proved slack of every constraint on [0, times[instant]]."""
+    many: list[dict[str, float]] = []
+    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+    many.append(_by_name(flow.fields[flow.first_segment].faces, upper))
+    for step in flow.steps[:instant]:
+        many.append(_by_name(flow.fields[step.segment].faces, step.face_upper))
+    return least_slack(many)
+
+
+def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
+    out: dict[str, float] = {}
+    for name, value in zip(names, upper, strict=True):
+        out[name] = min(-float(value), out.get(name, np.inf))
+    return out
+
+
+def nonlinear_variable(flow: Flow) -> int:
+    """The variable with the largest share in the nonlinear terms early in the flow."""
+    k = max(1, len(flow.steps) // 3) if flow.steps else 0
+    p, _ = flow.set_at(k)
+    exponents = flow.bounds.exponents
+    weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
+    degree = exponents.sum(axis=1)
+    share = np.zeros(flow.piece.variables)
+    for v in range(len(share)):
+        uses = (exponents[:, v] > 0) & (degree > 1)
+        share[v] = float((np.abs(p[:, uses]) * exponents[uses, v]).sum(axis=1) @ weight)
+    if not share.any():
+        return widest_variable(flow.bounds, p)
+    return int(np.argmax(share))
+
+
+def sampled_violation(flow: Flow) -> bool:
+    """Whether a sampled trajectory breaks a constraint at the end of the flow (floats: a guess)."""
+    fld = flow.fields[flow.steps[-1].segment if flow.steps else 0]
+    if not fld.faces:
+        return False
+    p, G = flow.set_at(len(flow.steps))
+    powers = sample_powers(flow.piece, flow.bounds.exponents)
+    inputs, _ = flow.variables_at(flow.time, p, G, fld)
+    faces = Evaluator(fld.observed)(inputs @ powers.T)[: len(fld.faces)]
+    return bool((faces > 0.0).any())
