@@ -144,7 +144,7 @@ def test_a_switch_at_an_undetermined_time_is_refused():
 def test_a_pole_that_a_time_switch_hides_stays_an_obligation():
     loop = close_loop(make(lambda x, t: np.maximum(t - 1.0, 0.0) / x[0], start=mg.Box([1, -1], [2, 1])))
     assert loop.segments[0].inputs[0].value == 0
-    assert [loop.graph.nodes[k].op for k in loop.graph.dropped] == [RECIP]
+    assert {loop.graph.nodes[k].op for k in loop.graph.dropped} == {RECIP}
     # A case distinction does not evaluate the branch it does not take.
     loop = close_loop(make(lambda x, t: np.where(t < 1.0, 1.0, 1.0 / x[0]), start=mg.Box([1, -1], [2, 1])))
     assert loop.graph.dropped == []

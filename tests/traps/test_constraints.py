@@ -55,7 +55,7 @@ def test_a_constraint_spike_narrower_than_a_step_in_space():
             "post",
             lambda x: np.ones(1),
             mg.Box([0.0], [0.01]),
-            constraints=lambda x: {"post": height / (1 + 1e6 * (x[0] - 0.777) ** 2) <= 1.0},
+            constraints=lambda x: {"post": height / (1 + 3e4 * (x[0] - 0.777) ** 2) <= 1.0},
         )
 
     assert_not_certified(mode(1.05), goal([1.0], [1.2]), 3.0)

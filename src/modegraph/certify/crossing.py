@@ -206,12 +206,17 @@ def _crossing(
 def _sampled(
     reach: Reach, region: Region, piece: Piece, p: Floats, generators: Sequence[Floats]
 ) -> tuple[bool, Floats]:
-    """Whether every sampled start is inside at some instant, remainder included (floats: a guess)."""
+    """Whether every sampled start is inside at some instant (floats: a guess).
+
+    Under a disturbance the remainder counts, for smaller parts do not make it smaller.
+    """
     eta = sample_variables(piece)
     powers = _powers(eta, reach.flow.table.exponents[: p.shape[2]])
     points = np.einsum("kin,sn->ksi", p, powers)
     z = np.stack([generator_box(G) for G in generators]) if len(generators) else np.zeros(p.shape[:2])
-    gauges = region.point_gauges(points) + region.box_gauges(z)[:, None]
+    gauges = region.point_gauges(points)
+    if reach.flow.w_radius.any():
+        gauges = gauges + region.box_gauges(z)[:, None]
     each = gauges.min(axis=0)
     worst = int(np.argmax(each))
     return bool((each < 1.0).all()), eta[worst]

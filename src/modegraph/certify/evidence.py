@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..expression.evaluate import Evaluator
 from ..reach.flow import Flow
-from .crossing import sample_powers, widest_variable
+from .crossing import sample_powers
 from .proof import least_slack
 
 Floats = NDArray[np.float64]
@@ -30,22 +30,6 @@ def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
     for name, value in zip(names, upper, strict=True):
         out[name] = min(-float(value), out.get(name, np.inf))
     return out
-
-
-def nonlinear_variable(flow: Flow) -> int:
-    """The variable with the largest share in the nonlinear terms early in the flow."""
-    k = max(1, len(flow.steps) // 3) if flow.steps else 0
-    p, _ = flow.set_at(k)
-    exponents = flow.bounds.exponents
-    weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
-    degree = exponents.sum(axis=1)
-    share = np.zeros(flow.piece.variables)
-    for v in range(len(share)):
-        uses = (exponents[:, v] > 0) & (degree > 1)
-        share[v] = float((np.abs(p[:, uses]) * exponents[uses, v]).sum(axis=1) @ weight)
-    if not share.any():
-        return widest_variable(flow.bounds, p)
-    return int(np.argmax(share))
 
 
 def sampled_violation(flow: Flow) -> bool:

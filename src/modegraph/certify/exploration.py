@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expression.tape import Tape
+from ..reach.chain import nonlinear_variable
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
 from ..reach.parallelotope import mode_gap
-from ..reach.restart import restarted
+from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
-from .evidence import nonlinear_variable, sampled_violation, slack_until
+from .evidence import sampled_violation, slack_until
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
 
 Floats = NDArray[np.float64]
 
-RESTART_ORDER = Order(4, 3)
 LADDER = ((4, 3), (5, 4))
 """Degrees of p and of the Jacobian flow: first try, and second try where the first breaks down."""
 MOST_MONOMIALS = 1300
@@ -32,7 +32,6 @@ MOST_PARTS = 48
 DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
-WIDE_GAP = 8.0
 TOO_MUCH_FEEDBACK = 0.5
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
@@ -295,7 +294,7 @@ class Exploration:
             pending = [j for j in pending if not now[j] <= 1.0]
             if not pending and (tail is not None or not safety):
                 break
-            settled = tail is not None and flow.time > tail.start + SETTLING / tail.decay
+            settled = tail is not None and np.isfinite(tail.decay) and flow.time > tail.start + SETTLING / tail.decay
             if settled and all(now[j] > 0.98 * previous[j] for j in pending):
                 if flow.frame is not None or self.framed[0].frame is None:
                     break
@@ -319,7 +318,7 @@ class Exploration:
         """
         flow = last[0]
         framed = not first or mode_gap(flow.slope) > WIDE_GAP
-        following = restarted(last, self.framed if framed else self.fields, RESTART_ORDER)
+        following = restarted(last, self.framed if framed else self.fields)
         started = following is not None and following.time < end and following.advance(end)
         if following is not None and started and proved_instants(following) == len(following.steps):
             return following

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,13 +10,8 @@ from .compiled import CompiledMode
 from .field import Field
 from .flow import RESTART_STEPS, Flow, Order
 from .parallelotope import mode_gap
-from .restart import restarted
+from .restart import WIDE_GAP, restarted
 from .start import Piece
-
-WIDE_GAP = 8.0
-"""Ratio of the fastest to the slowest mode from which the frame of the modes is used at once."""
-RESTARTED, CHEAP, MOST_RESTARTED = Order(4, 3), Order(3, 2), 500
-"""Degrees after a restart, if that makes at most so many monomials, or else."""
 
 
 class Chain:
@@ -54,10 +48,7 @@ class Chain:
         flow = self.flows[-1]
         in_modes = len(self.flows) > 1 or mode_gap(flow.slope) > WIDE_GAP
         fields = self.framed if in_modes else self.compiled.fields
-        n, free = len(self.compiled.loop.states), flow.piece.chart.free
-        variables = n + (free if free <= n else 0) + len(self.piece.uncertain)
-        order = RESTARTED if math.comb(variables + RESTARTED.degree, variables) <= MOST_RESTARTED else CHEAP
-        following = restarted([flow], fields, order)
+        following = restarted([flow], fields)
         if following is None or flow.time >= end or not following.advance(end):
             flow.next_restart = len(flow.steps) + RESTART_STEPS
         else:

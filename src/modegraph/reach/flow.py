@@ -39,6 +39,8 @@ GROWTH_CAP = 0.1
 """Largest spectral radius of h M, M the bound of how far the Jacobian strays from its centre."""
 RATE_CAP = 1.0
 """Largest spectral radius of h A0, A0 the Jacobian at the centre."""
+OUTGROWN = 1e3
+"""A remainder this many times larger than the set is given up."""
 RUNAWAY_STEPS = 10
 """A remainder that doubles over this many steps while they cover little time is given up."""
 DISTURBED_RATE_CAP = 0.2
@@ -286,6 +288,8 @@ class Flow:
         """Whether the remainder has begun its last growth: it feeds itself while the steps shrink."""
         size = float(generator_box(G).max(initial=0.0))
         self._sizes.append(size)
+        if size > OUTGROWN * (1.0 + np.abs(self._p).sum(axis=1).max()):
+            return True
         self._longest = max(self._longest, self.steps[-1].end - self.steps[-1].start)
         back = RUNAWAY_STEPS
         if len(self._sizes) <= back or size == 0.0:
@@ -467,9 +471,11 @@ class Flow:
 
     def swell(self, step: Step) -> Floats:
         """Box (n,) by which the tube of a step exceeds the hull of p at its ends, state coordinates."""
-        out = step.bend + step.tube
+        out = (step.bend + step.tube) * (1.0 + 4.0 * UNIT)
         if self.frame is not None:
-            out = np.abs(self.frame.V) @ out * (1.0 + 8.0 * (len(out) + 2) * UNIT)
+            # V p is rounded at both ends; the polynomials of neighbouring instants are of one size.
+            size = 8.0 * (step.p.shape[1] + len(out) + 8) * UNIT * (np.abs(step.p).sum(axis=1) + out)
+            out = np.abs(self.frame.V) @ (out + size) * (1.0 + 8.0 * (len(out) + 2) * UNIT)
         return np.asarray(out)
 
     def tubes(self) -> tuple[Floats, Floats]:
@@ -477,6 +483,9 @@ class Flow:
         polynomials = np.stack([self.state_set(k)[0] for k in range(len(self.steps) + 1)])
         lo, hi = self.bounds.ranges(polynomials)
         out = np.stack([self.swell(s) for s in self.steps])
+        if self.frame is not None:
+            before = np.concatenate([out[:1], out[:-1]])
+            out = np.maximum(out, out + 1e-12 * (before + np.abs(polynomials).sum(axis=2)[:-1]))
         below = np.minimum(lo[:-1], lo[1:]) - out
         above = np.maximum(hi[:-1], hi[1:]) + out
         return np.nextafter(below, -np.inf), np.nextafter(above, np.inf)

@@ -8,6 +8,7 @@ restarting only widens: recipe, section 5.)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -23,8 +24,13 @@ from .start import Piece
 
 Floats = NDArray[np.float64]
 
+WIDE_GAP = 8.0
+"""Ratio of neighbouring decay rates from which the frame of the modes is used at the first restart."""
+FULL, CHEAP, MOST_MONOMIALS = Order(4, 3), Order(3, 2), 500
+"""Degrees after a restart, if that makes at most so many monomials, or else."""
 
-def restarted(flows: Sequence[Flow], fields: Sequence[Field], order: Order) -> Flow | None:
+
+def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
     """A flow that continues ``flows`` from a zonotope around their ends; None if none is found.
 
     One flow keeps the linear part of its polynomial; several are enclosed together, and start at the
@@ -41,6 +47,8 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], order: Order) -> F
     chart = replace(first.piece.chart, centre=centre, axes=axes, round=False, faces=None, original=False)
     m = first.piece.chart.free
     free = axes.shape[1]
+    variables = free + len(first.piece.uncertain)
+    full = math.comb(variables + FULL.degree, variables)
     lo = np.concatenate([-np.ones(free), np.min([flow.piece.lo[m:] for flow in flows], axis=0)])
     hi = np.concatenate([np.ones(free), np.max([flow.piece.hi[m:] for flow in flows], axis=0)])
     spent = [float(f.seen_bounds.upper(f.steps[-1].energy) + f.steps[-1].energy_radius) for f in flows]
@@ -49,7 +57,7 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], order: Order) -> F
         Piece(chart, lo, hi),
         first.w_centre,
         first.w_radius,
-        order,
+        FULL if full <= MOST_MONOMIALS else CHEAP,
         names=first.names,
         stops=first.stops,
         t0=max(flow.time for flow in flows),
