@@ -55,7 +55,7 @@ def test_a_disturbance_that_grows_with_the_state():
         )
 
     assert_not_certified(mode(0.41), goal([-0.5], [0.5]), 10.0)
-    assert_certified(mode(0.35), goal([-0.5], [0.5]), 12.0)
+    assert_certified(mode(0.3), goal([-0.5], [0.5]), 12.0)
 
 
 def test_a_disturbance_off_centre():

@@ -1,0 +1,218 @@
+"""|true value - stored polynomial| <= R at every node of random tapes, against ball arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx, fmpq
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from modegraph.enclosure.jets import PLAIN, TOO_WIDE, solve_in_time
+from modegraph.enclosure.monomials import monomials
+from modegraph.enclosure.remainder import coefficient_norms, image, remainders, wants_another_try
+from modegraph.expression import ops
+
+K = 3
+TABLE = monomials((1, 1), 3)
+CUT = np.array([3, 3, 2, 2], np.int64)
+SPECIAL = [0.0, -0.0, 5e-324, -1e-310, 1e-150, 1e-17, 1 / 3, 1.0, -2.5, 40.0, -710.0, 1e8, -1e150, 1e300]
+NUMBERS = st.one_of(st.sampled_from(SPECIAL), st.floats(-4.0, 4.0))
+SPREADS = st.sampled_from([0.0, 0.0, 5e-324, 1e-160, 1e-9, 0.1, 0.5, 3.0, 1e9])
+
+
+class Program:
+    """A tape over two variables, row by row."""
+
+    def __init__(self) -> None:
+        self.rows: list[list[int]] = [[ops.VAR, 0, -1, -1], [ops.VAR, 1, -1, -1]]
+        self.const = [0.0, 0.0]
+
+    def add(self, op: int, a: int = -1, b: int = -1, c: int = -1, const: float = 0.0) -> int:
+        self.rows.append([op, a, b, c])
+        self.const.append(const)
+        return len(self.rows) - 1
+
+    def apply(self, op: int, a: int, b: int, c: int, const: float) -> None:
+        if op == ops.CONST:
+            self.add(op, const=const)
+        elif op in (ops.MULC, ops.ADDC):
+            self.add(op, a, const=const)
+        elif op == ops.SIN:
+            here = len(self.rows)
+            self.add(ops.SIN, a, here + 1)
+            self.add(ops.COS, a, here)
+        elif op == ops.LOG:
+            self.add(ops.LOG, a, self.add(ops.RECIP, a))
+        elif op == ops.ATAN:
+            slope = self.add(ops.RECIP, self.add(ops.ADDC, self.add(ops.SQR, a), const=1.0))
+            self.add(ops.ATAN, a, slope)
+        elif op in (ops.ADD, ops.SUB, ops.MUL):
+            self.add(op, a, b)
+        elif op == ops.WHERE:
+            self.add(op, a, b, c)
+        else:
+            self.add(op, a)
+
+
+KINDS = [
+    ops.CONST, ops.ADD, ops.SUB, ops.MUL, ops.SQR, ops.MULC, ops.ADDC, ops.SIN, ops.RECIP, ops.EXP, ops.LOG,
+    ops.ATAN, ops.RELU, ops.STEP, ops.WHERE,
+]  # fmt: skip
+CHOICES = st.tuples(st.sampled_from(KINDS), *[st.integers(0, 30)] * 3, NUMBERS)
+
+
+@st.composite
+def programs(draw: Any) -> Program:
+    made = Program()
+    for op, a, b, c, const in draw(st.lists(CHOICES, min_size=1, max_size=7)):
+        size = len(made.rows)
+        made.apply(op, a % size, b % size, c % size, const)
+    return made
+
+
+def stored(made: Program, start: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """P, R and kinks for variables with the coefficients ``start`` (2, K+1, N)."""
+    rows = np.array(made.rows, np.int64)
+    count = len(rows)
+    const = np.array(made.const)
+    P, dg = np.zeros((count, K + 1, TABLE.size)), np.full((count, K + 1), -1, np.int64)
+    norms, R = np.zeros((count, K + 1, TABLE.order + 1)), np.zeros(count)
+    kinks, ranges = np.zeros((count, 2)), np.full((count, 2), np.nan)
+    P[:2] = start
+    for v in range(2):
+        for j in range(K + 1):
+            dg[v, j] = max((int(TABLE.degree[k]) for k in np.flatnonzero(start[v, j])), default=-1)
+    R[:2] = radius
+    outputs, variables = np.array([count - 1]), np.array([0, 1])
+    for _ in range(2):
+        solve_in_time(rows, const, kinks, ranges, outputs, variables, 0, P, dg, 1.0, K, CUT, *TABLE.arrays)
+        coefficient_norms(P, dg, norms, TABLE.start)
+        nothing = np.zeros(count)
+        remainders(rows, const, nothing, kinks, ranges, P, dg, norms, R, K, CUT, TABLE.pairs, *TABLE.arrays)
+        if not wants_another_try(rows, kinks, ranges):
+            break
+    return P, R, kinks
+
+
+def ball(x: Fraction) -> arb:
+    return arb(fmpq(x.numerator, x.denominator))
+
+
+def polynomial(coefficients: np.ndarray, xi: list[Fraction], s: Fraction) -> arb:
+    total = Fraction(0)
+    for j, k in zip(*np.nonzero(coefficients), strict=True):
+        e = TABLE.exponents[k]
+        total += Fraction(float(coefficients[j, k])) * xi[0] ** int(e[0]) * xi[1] ** int(e[1]) * s ** int(j)
+    return ball(total)
+
+
+def truth(made: Program, x: list[arb]) -> list[arb | None]:
+    """Exact values, None where undefined or where the balls cannot tell."""
+    out: list[arb | None] = []
+    one = {ops.SIN: arb.sin, ops.COS: arb.cos, ops.EXP: arb.exp, ops.ATAN: arb.atan, ops.SQR: lambda v: v * v}
+    for (op, a, b, c), const in zip(made.rows, made.const, strict=True):
+        value: arb | None = None
+        va = None if op in (ops.VAR, ops.CONST) else out[a]
+        if op == ops.VAR:
+            value = x[a]
+        elif op == ops.CONST:
+            value = arb(const)
+        elif op == ops.WHERE:
+            vc = out[c]
+            value = None if vc is None else va if vc > 0 else out[b] if vc <= 0 else None
+        elif va is None:
+            pass
+        elif op in one:
+            value = one[op](va)
+        elif op == ops.RECIP:
+            value = 1 / va if va != 0 else None
+        elif op == ops.LOG:
+            value = va.log() if va > 0 else None
+        elif op == ops.MULC:
+            value = va * arb(const)
+        elif op == ops.ADDC:
+            value = va + arb(const)
+        elif op in (ops.RELU, ops.STEP):
+            inside = va if op == ops.RELU else arb(1)
+            value = inside if va > 0 else arb(0) if va <= 0 else None
+        elif out[b] is not None:
+            vb = out[b]
+            value = va + vb if op == ops.ADD else va - vb if op == ops.SUB else va * vb
+        out.append(value if value is not None and value.is_finite() else None)
+    return out
+
+
+def check(made: Program, start: np.ndarray, radius: np.ndarray, points: list[list[Fraction]]) -> None:
+    P, R, _ = stored(made, start, radius)
+    with ctx.workprec(1200):
+        for *xi, s, off0, off1 in points:
+            offsets = [ball(Fraction(float(r)) * o) for r, o in zip(radius, (off0, off1), strict=True)]
+            values = truth(made, [polynomial(P[v], xi, s) + offsets[v] for v in range(2)])
+            for q, value in enumerate(values):
+                if np.isfinite(R[q]) and value is not None:
+                    assert not abs(value - polynomial(P[q], xi, s)) > arb(float(R[q])), (made.rows[: q + 1], xi, s)
+                elif np.isfinite(R[q]) and made.rows[q][0] in (ops.RECIP, ops.LOG):
+                    argument = values[made.rows[q][1]]
+                    bad = argument is not None and (argument == 0 or (made.rows[q][0] == ops.LOG and argument <= 0))
+                    assert not bad, ("undefined, but bounded", made.rows[: q + 1])
+
+
+UNIT = st.integers(-8, 8).map(lambda k: Fraction(k, 8))
+POINT = st.tuples(UNIT, UNIT, st.integers(0, 8).map(lambda k: Fraction(k, 8)), UNIT, UNIT).map(list)
+EXTREMES = [[Fraction(a), Fraction(b), Fraction(s), Fraction(a), Fraction(b)] for a in (-1, 1) for b in (-1, 1) for s in (0, 1)]
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@given(programs(), st.tuples(NUMBERS, NUMBERS), st.lists(SPREADS, min_size=8, max_size=8), st.lists(POINT, max_size=4))
+def test_random_expressions(
+    made: Program, centre: tuple[float, float], spread: list[float], points: list[list[Fraction]]
+) -> None:
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[:, 0, 0] = centre
+    for v in range(2):
+        start[v, 0, TABLE.linear[v]] = spread[v]
+        start[v, 0, TABLE.linear[1 - v]] = -0.5 * spread[2 + v]
+        start[v, 1, 0] = spread[4 + v]
+        start[v, 2, TABLE.linear[v]] = 0.25 * spread[4 + v]
+    check(made, start, np.array(spread[6:]), [*EXTREMES, *points])
+
+
+@pytest.mark.parametrize("op", [ops.SIN, ops.RECIP, ops.EXP, ops.LOG, ops.ATAN, ops.RELU, ops.STEP])
+@pytest.mark.parametrize("centre", [5e-324, 1e-310, 1e-150, 0.7, 20.0, 1e8, 1e154, 1e300])
+def test_one_function_at_every_scale(op: int, centre: float) -> None:
+    for sign in (1.0, -1.0):
+        for share in (0.0, 1e-12, 0.4, 0.999, 3.0):
+            made = Program()
+            made.apply(op, 0, 0, 0, 0.0)
+            start = np.zeros((2, K + 1, TABLE.size))
+            start[0, 0, 0] = sign * centre
+            start[0, 0, TABLE.linear[0]] = 0.5 * share * centre
+            start[0, 1, 0] = 0.5 * share * centre
+            check(made, start, np.zeros(2), EXTREMES)
+
+
+@pytest.mark.parametrize("op, lo, hi", [(ops.RECIP, 0.1, 9.0), (ops.EXP, -30.0, 30.0), (ops.LOG, 1e-3, 9.0), (ops.ATAN, -50.0, 50.0)])
+def test_wide_arguments_fall_back_to_the_range(op: int, lo: float, hi: float) -> None:
+    made = Program()
+    made.apply(op, 0, 0, 0, 0.0)
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, 0, 0], start[0, 0, TABLE.linear[0]] = 0.5 * (lo + hi), 0.5 * (hi - lo)
+    P, R, kinks = stored(made, start, np.zeros(2))
+    assert kinks[-1, 0] in (PLAIN, TOO_WIDE)
+    low, high = image(op, lo, hi)
+    assert R[-1] <= 0.51 * (high - low) * 1.01
+    assert np.count_nonzero(P[-1]) <= 1
+    check(made, start, np.zeros(2), [*EXTREMES, [Fraction(1, 3)] * 2 + [Fraction(1, 2)] + [Fraction(0)] * 2])
+
+
+@pytest.mark.parametrize("op", [ops.RECIP, ops.LOG])
+def test_undefined_arguments_are_unbounded(op: int) -> None:
+    made = Program()
+    made.apply(op, 0, 0, 0, 0.0)
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, 0, 0], start[0, 0, TABLE.linear[0]] = 1.0, 1.0
+    assert np.isinf(stored(made, start, np.zeros(2))[1][-1])
