@@ -33,8 +33,11 @@ class ModelFile:
 
     def build(self, budget: float | None) -> ModeGraph:
         """The graph of the model, with a progress bar in a terminal."""
+        from modegraph.enclosure import kernels_are_compiled
         from modegraph.graph.build import build
 
+        if not kernels_are_compiled():
+            print("first run: compiling the kernels, about half a minute, once", file=sys.stderr)
         return build(
             self.modes,
             horizon=self.horizon,
