@@ -36,14 +36,15 @@ def one_step(dynamics: Any, start: mg.Box, order: Order, h: float, w: float = 0.
 def holds(flow: Flow, xi: np.ndarray, x: np.ndarray, tolerance: float = 0.0) -> None:
     """x, reached from the start xi, is in p(xi) + sum_g G_g(xi) zeta_g and the tube ends around it."""
     step = flow.steps[-1]
-    powers = np.prod(xi ** flow.table.exponents, axis=1)
+    powers = np.prod(xi**flow.table.exponents, axis=1)
     rest = x - step.p @ powers
     G = step.G @ powers[: step.G.shape[2]]
     rng = np.random.default_rng(1)
     for d in [*np.eye(len(x)), *rng.normal(size=(30, len(x)))]:
         assert abs(d @ rest) <= np.abs(G @ d).sum() * (1 + 1e-9) + tolerance + 1e-16 * np.abs(d) @ np.abs(x)
     lo, hi = flow.tubes()
-    assert (lo[-1] - tolerance <= x).all() and (x <= hi[-1] + tolerance).all()
+    assert (lo[-1] - tolerance <= x).all()
+    assert (x <= hi[-1] + tolerance).all()
 
 
 def exponential(A: np.ndarray, push: np.ndarray, h: arb, x: arb_mat) -> arb_mat:
@@ -97,6 +98,8 @@ def test_a_nonlinear_step_holds_integrated_trajectories(order: Order, w: float) 
         x = np.array([0.75 + 0.25 * xi[0], 0.5 * xi[1]])
         push = rng.choice([-w, w], 2)
         for t in (0.5 * end, 0.5 * end):
-            x = solve_ivp(lambda t, y, p=push: rate(y, p), (0, t), x, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+            x = solve_ivp(lambda t, y, p=push: rate(y, p), (0, t), x, "DOP853", rtol=1e-13, atol=1e-14).y[
+                :, -1
+            ]
             push = -push * rng.choice([-1.0, 1.0])
         holds(flow, xi, x, 1e-11)

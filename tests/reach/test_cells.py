@@ -32,7 +32,10 @@ def test_a_restricted_polynomial_is_the_same_function(start: mg.Box, scale: floa
                     if start.__class__ is mg.Ball and eta @ eta > 1.0:
                         continue
                     powers = [
-                        np.prod([Fraction(float(e)) ** int(k) for e, k in zip(eta, a, strict=True)]) for a in table.exponents
+                        np.prod([Fraction(float(e)) ** int(k) for e, k in zip(eta, a, strict=True)])
+                        for a in table.exponents
                     ]
                     for row, bound in zip(p, top, strict=True):
-                        assert sum(Fraction(float(c)) * x for c, x in zip(row, powers, strict=True)) <= Fraction(float(bound))
+                        assert sum(
+                            Fraction(float(c)) * x for c, x in zip(row, powers, strict=True)
+                        ) <= Fraction(float(bound))

@@ -30,4 +30,5 @@ def test_the_limit_is_met() -> None:
         t, steps = next_instant(t, 0.013, 1 / 3), steps + 1
         assert steps < 100
     assert t == 1 / 3
-    assert is_exact(0.0, 0.1) and not is_exact(0.1, 1e6)
+    assert is_exact(0.0, 0.1)
+    assert not is_exact(0.1, 1e6)

@@ -24,12 +24,16 @@ def rate(x: Any, w: Any) -> Any:
 @pytest.fixture(scope="module")
 def compiled() -> CompiledMode:
     plant = mg.System(lambda x, u, w: np.array(rate(x, w)), states=2, inputs=1, disturbance=mg.Box([-1], [1]))
-    mode = mg.Mode("m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=mg.Box(LO, HI))
+    mode = mg.Mode(
+        "m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=mg.Box(LO, HI)
+    )
     return compile_mode(mode, None)
 
 
 def flow_of(compiled: CompiledMode, piece: Any, steps: int) -> Flow:
-    flow = Flow(compiled.fields, piece, compiled.w_centre, compiled.w_radius, Order(3, 2), names=compiled.loop.names)
+    flow = Flow(
+        compiled.fields, piece, compiled.w_centre, compiled.w_radius, Order(3, 2), names=compiled.loop.names
+    )
     for _ in range(steps):
         assert flow.advance(10.0)
     return flow
@@ -47,7 +51,11 @@ def points(flow: Flow) -> np.ndarray:
 def holds(flow: Flow, x: np.ndarray) -> None:
     p, G = flow.state_set(0)
     for d in np.random.default_rng(2).normal(size=(50, x.shape[1])):
-        top = float(flow.bounds.upper(d @ p)) + np.abs(d @ G[:, :, 0].T).sum() if len(G) else float(flow.bounds.upper(d @ p))
+        top = (
+            float(flow.bounds.upper(d @ p)) + np.abs(d @ G[:, :, 0].T).sum()
+            if len(G)
+            else float(flow.bounds.upper(d @ p))
+        )
         assert (x @ d <= top + 1e-12 * abs(top)).all()
 
 
@@ -55,7 +63,8 @@ def holds(flow: Flow, x: np.ndarray) -> None:
 def test_a_restart_holds_the_end(compiled: CompiledMode, framed: bool) -> None:
     flow = flow_of(compiled, compiled.whole(), 14)
     following = restarted([flow], compiled.framed_fields() if framed else compiled.fields)
-    assert following is not None and following.time == flow.time
+    assert following is not None
+    assert following.time == flow.time
     holds(following, points(flow))
     spent = float(flow.seen_bounds.upper(flow.steps[-1].energy)) + flow.steps[-1].energy_radius
     assert following.advance(10.0)
@@ -66,7 +75,8 @@ def test_a_restart_holds_the_end(compiled: CompiledMode, framed: bool) -> None:
 def test_a_common_restart_holds_all_ends(compiled: CompiledMode) -> None:
     flows = [flow_of(compiled, piece, 10 + 2 * k) for k, piece in enumerate(compiled.whole().split(0))]
     following = restarted(flows, compiled.fields)
-    assert following is not None and following.time == max(flow.time for flow in flows)
+    assert following is not None
+    assert following.time == max(flow.time for flow in flows)
     for flow in flows:
         holds(following, points(flow))
 
@@ -80,6 +90,9 @@ def test_a_chain_holds_trajectories_under_switched_disturbances(compiled: Compil
     for _ in range(12):
         x, w = rng.choice([LO, HI], axis=0).astype(float), rng.choice([-1.0, 1.0])
         for _ in range(3):
-            x = solve_ivp(lambda t, y, v=w: rate(y, [v]), (0, 0.5), x, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+            x = solve_ivp(lambda t, y, v=w: rate(y, [v]), (0, 0.5), x, "DOP853", rtol=1e-11, atol=1e-12).y[
+                :, -1
+            ]
             w = -w
-        assert (lo - 1e-10 <= x).all() and (x <= hi + 1e-10).all()
+        assert (lo - 1e-10 <= x).all()
+        assert (x <= hi + 1e-10).all()

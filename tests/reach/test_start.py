@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction as F
+
 import numpy as np
 import pytest
 
@@ -53,25 +55,30 @@ def test_every_start_is_in_a_piece(kind: str, scale: float) -> None:
 
 def test_unknown_constants_are_variables_where_they_are_not_known() -> None:
     piece = whole(mg.Box([0.0], [1.0]), [(0.1, 0.7), (2.0, 2.0)])
-    assert piece.variables == 2 and piece.uncertain.tolist() == [0]
+    assert piece.variables == 2
+    assert piece.uncertain.tolist() == [0]
     ranges = [part.unknown_range(0) for part in piece.split(1)]
-    assert min(r[0] for r in ranges) <= 0.1 and max(r[1] for r in ranges) >= 0.7
+    assert min(r[0] for r in ranges) <= 0.1
+    assert max(r[1] for r in ranges) >= 0.7
     assert ranges[0][1] >= ranges[1][0] or ranges[1][1] >= ranges[0][0]
 
 
 def test_a_point_has_no_variable() -> None:
     piece = point(np.array([0.1, 0.2]), [3.0])
     states, unknowns, slack = piece.polynomials(np.zeros(0, np.int64), 1)
-    assert states[:, 0].tolist() == [0.1, 0.2] and unknowns[0, 0] == 3.0 and not slack.any()
+    assert states[:, 0].tolist() == [0.1, 0.2]
+    assert unknowns[0, 0] == 3.0
+    assert not slack.any()
 
 
-@pytest.mark.parametrize("lo, hi", [(0.1, 0.3), (-0.7, 0.7), (5e-324, 1e-323), (-1.7e308, 1.7e308), (0.1, 0.1)])
+@pytest.mark.parametrize(
+    "lo, hi", [(0.1, 0.3), (-0.7, 0.7), (5e-324, 1e-323), (-1.7e308, 1.7e308), (0.1, 0.1)]
+)
 def test_cover_is_exact(lo: float, hi: float) -> None:
-    from fractions import Fraction as F
-
     c, r = (float(v[0]) for v in cover(np.array([lo]), np.array([hi])))
     if np.isfinite(r):
-        assert F(c) - F(r) <= F(lo) and F(hi) <= F(c) + F(r)
+        assert F(c) - F(r) <= F(lo)
+        assert F(hi) <= F(c) + F(r)
     else:
         assert hi > 1e308
 
