@@ -21,9 +21,7 @@ from modegraph.reach.compiled import compile_mode
 
 def scene(dynamics: Any, start: mg.Box, w: mg.Box | None = None, **more: Any) -> Scene:
     plant = mg.System(dynamics, states=start.dim, inputs=1, disturbance=w)
-    mode = mg.Mode(
-        "m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=start, **more
-    )
+    mode = mg.Mode("m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=start, **more)
     c = compile_mode(mode, None)
     none = np.zeros(0)
     lo, hi = (none, none) if w is None else (w.lo, w.hi)

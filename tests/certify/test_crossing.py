@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 
 import modegraph as mg
 from modegraph.certify.crossing import Missed, Reach, find_crossings, proved_instants
@@ -26,9 +25,7 @@ def decaying(limit: float = 5.0, start: tuple[float, float] = (1.0, 2.0)) -> Flo
         constraints=lambda x: {"top": x[0] <= limit},
     )
     c = compile_mode(mode, None)
-    flow = Flow(
-        c.fields, c.whole(), c.w_centre, c.w_radius, Order(1, 0), names=c.loop.names, longest_step=0.05
-    )
+    flow = Flow(c.fields, c.whole(), c.w_centre, c.w_radius, Order(1, 0), names=c.loop.names, longest_step=0.05)
     assert flow.run(3.0)
     return flow
 
@@ -67,7 +64,6 @@ def test_nothing_is_inside_before_the_constraints_are_proved() -> None:
     assert proved_instants(decaying(limit=2.05)) > 10
 
 
-@pytest.mark.xfail(reason="the stay inside a target on (x, reset(x)) is bounded by the source's own memory")
 def test_the_stay_in_a_target_on_its_own_memory() -> None:
     source = mg.Mode(
         "a",

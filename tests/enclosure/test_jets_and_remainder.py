@@ -165,19 +165,14 @@ def check(made: Program, start: np.ndarray, radius: np.ndarray, points: list[lis
                     )
                 elif np.isfinite(R[q]) and made.rows[q][0] in (ops.RECIP, ops.LOG):
                     argument = values[made.rows[q][1]]
-                    bad = argument is not None and (
-                        argument == 0 or (made.rows[q][0] == ops.LOG and argument <= 0)
-                    )
+                    bad = argument is not None and (argument == 0 or (made.rows[q][0] == ops.LOG and argument <= 0))
                     assert not bad, ("undefined, but bounded", made.rows[: q + 1])
 
 
 UNIT = st.integers(-8, 8).map(lambda k: Fraction(k, 8))
 POINT = st.tuples(UNIT, UNIT, st.integers(0, 8).map(lambda k: Fraction(k, 8)), UNIT, UNIT).map(list)
 EXTREMES = [
-    [Fraction(a), Fraction(b), Fraction(s), Fraction(a), Fraction(b)]
-    for a in (-1, 1)
-    for b in (-1, 1)
-    for s in (0, 1)
+    [Fraction(a), Fraction(b), Fraction(s), Fraction(a), Fraction(b)] for a in (-1, 1) for b in (-1, 1) for s in (0, 1)
 ]
 
 
@@ -232,9 +227,7 @@ def test_wide_arguments_fall_back_to_the_range(op: int, lo: float, hi: float) ->
     check(made, start, np.zeros(2), [*EXTREMES, [Fraction(1, 3)] * 2 + [Fraction(1, 2)] + [Fraction(0)] * 2])
 
 
-@pytest.mark.parametrize(
-    "op", [ops.RECIP, ops.EXP, ops.LOG, ops.ATAN, ops.SIN, ops.RELU, ops.STEP, ops.MULC, ops.SQR]
-)
+@pytest.mark.parametrize("op", [ops.RECIP, ops.EXP, ops.LOG, ops.ATAN, ops.SIN, ops.RELU, ops.STEP, ops.MULC, ops.SQR])
 def test_overflow_is_never_bounded(op: int) -> None:
     """A square that overflows is stored as infinite: no function of it has a finite value and bound."""
     made = Program()

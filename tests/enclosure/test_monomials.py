@@ -10,9 +10,7 @@ from modegraph.enclosure.monomials import monomial_count, monomials
 from modegraph.errors import ModegraphError
 
 
-@pytest.mark.parametrize(
-    "weights, order", [((), 3), ((1,), 0), ((1, 1), 4), ((1, 1, 1), 3), ((1, 1, 2), 4), ((2,), 3)]
-)
+@pytest.mark.parametrize("weights, order", [((), 3), ((1,), 0), ((1, 1), 4), ((1, 1, 1), 3), ((1, 1, 2), 4), ((2,), 3)])
 def test_a_table_against_enumeration(weights: tuple[int, ...], order: int) -> None:
     table = monomials(weights, order)
     rows = [tuple(e) for e in table.exponents.tolist()]

@@ -38,7 +38,5 @@ def test_bisection_stops_at_the_limit_and_finds_the_extremum() -> None:
 
 def test_no_variable() -> None:
     assert (
-        3.0
-        <= upper_bound(np.array([3.0]), np.zeros((1, 0), np.int64), np.zeros(0), np.zeros(0), 0.0, 9)
-        < 3.0 + 1e-12
+        3.0 <= upper_bound(np.array([3.0]), np.zeros((1, 0), np.int64), np.zeros(0), np.zeros(0), 0.0, 9) < 3.0 + 1e-12
     )

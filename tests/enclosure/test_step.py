@@ -61,9 +61,7 @@ def exponential(A: np.ndarray, push: np.ndarray, h: arb, x: arb_mat) -> arb_mat:
 def test_a_linear_step_is_exact_up_to_its_remainder(name: str, w: float) -> None:
     A = np.array(MATRICES[name])
     start = mg.Box([0.75, -0.5], [1.25, 0.5])
-    flow = one_step(
-        (lambda x, u, w: A @ x + B @ w) if w else (lambda x, u: A @ x), start, Order(1, 0), 0.03125, w
-    )
+    flow = one_step((lambda x, u, w: A @ x + B @ w) if w else (lambda x, u: A @ x), start, Order(1, 0), 0.03125, w)
     rng = np.random.default_rng(0)
     with ctx.workprec(300):
         h = arb(flow.steps[0].end)
@@ -98,8 +96,6 @@ def test_a_nonlinear_step_holds_integrated_trajectories(order: Order, w: float) 
         x = np.array([0.75 + 0.25 * xi[0], 0.5 * xi[1]])
         push = rng.choice([-w, w], 2)
         for t in (0.5 * end, 0.5 * end):
-            x = solve_ivp(lambda t, y, p=push: rate(y, p), (0, t), x, "DOP853", rtol=1e-13, atol=1e-14).y[
-                :, -1
-            ]
+            x = solve_ivp(lambda t, y, p=push: rate(y, p), (0, t), x, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
             push = -push * rng.choice([-1.0, 1.0])
         holds(flow, xi, x, 1e-11)

@@ -36,6 +36,6 @@ def test_a_restricted_polynomial_is_the_same_function(start: mg.Box, scale: floa
                         for a in table.exponents
                     ]
                     for row, bound in zip(p, top, strict=True):
-                        assert sum(
-                            Fraction(float(c)) * x for c, x in zip(row, powers, strict=True)
-                        ) <= Fraction(float(bound))
+                        assert sum(Fraction(float(c)) * x for c, x in zip(row, powers, strict=True)) <= Fraction(
+                            float(bound)
+                        )

@@ -24,16 +24,12 @@ def rate(x: Any, w: Any) -> Any:
 @pytest.fixture(scope="module")
 def compiled() -> CompiledMode:
     plant = mg.System(lambda x, u, w: np.array(rate(x, w)), states=2, inputs=1, disturbance=mg.Box([-1], [1]))
-    mode = mg.Mode(
-        "m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=mg.Box(LO, HI)
-    )
+    mode = mg.Mode("m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=mg.Box(LO, HI))
     return compile_mode(mode, None)
 
 
 def flow_of(compiled: CompiledMode, piece: Any, steps: int) -> Flow:
-    flow = Flow(
-        compiled.fields, piece, compiled.w_centre, compiled.w_radius, Order(3, 2), names=compiled.loop.names
-    )
+    flow = Flow(compiled.fields, piece, compiled.w_centre, compiled.w_radius, Order(3, 2), names=compiled.loop.names)
     for _ in range(steps):
         assert flow.advance(10.0)
     return flow
@@ -90,9 +86,7 @@ def test_a_chain_holds_trajectories_under_switched_disturbances(compiled: Compil
     for _ in range(12):
         x, w = rng.choice([LO, HI], axis=0).astype(float), rng.choice([-1.0, 1.0])
         for _ in range(3):
-            x = solve_ivp(lambda t, y, v=w: rate(y, [v]), (0, 0.5), x, "DOP853", rtol=1e-11, atol=1e-12).y[
-                :, -1
-            ]
+            x = solve_ivp(lambda t, y, v=w: rate(y, [v]), (0, 0.5), x, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
             w = -w
         assert (lo - 1e-10 <= x).all()
         assert (x <= hi + 1e-10).all()

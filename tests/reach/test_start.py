@@ -71,9 +71,7 @@ def test_a_point_has_no_variable() -> None:
     assert not slack.any()
 
 
-@pytest.mark.parametrize(
-    "lo, hi", [(0.1, 0.3), (-0.7, 0.7), (5e-324, 1e-323), (-1.7e308, 1.7e308), (0.1, 0.1)]
-)
+@pytest.mark.parametrize("lo, hi", [(0.1, 0.3), (-0.7, 0.7), (5e-324, 1e-323), (-1.7e308, 1.7e308), (0.1, 0.1)])
 def test_cover_is_exact(lo: float, hi: float) -> None:
     c, r = (float(v[0]) for v in cover(np.array([lo]), np.array([hi])))
     if np.isfinite(r):

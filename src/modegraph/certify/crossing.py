@@ -185,7 +185,8 @@ def _crossing(
     flow = reach.flow
     window = 0.0
     end = len(p) - 1
-    if instant < end and gauges[min(instant + 1, end)] <= 1.0:
+    # How far reset(x) strays between instants is not bounded.
+    if reach.reset is None and instant < end and gauges[min(instant + 1, end)] <= 1.0:
         plain = region.gauges(bounds, p[instant:], [np.zeros((0, p.shape[1], 1))] * (end + 1 - instant))
         size = p.shape[1]
         steps = flow.steps[instant:end]

@@ -384,9 +384,10 @@ class Exploration:
             ahead = flows[0].times[0] - min(f.times[0] for f in before)
         for flow in flows:
             reach = Reach(flow, self.horizon, goal.reset)
-            if earliest is None:
-                found = reach.earliest(goal.region, self.plant)
-                earliest = None if found is None else max(0.0, np.nextafter(found - ahead, -np.inf))
+            touched = reach.earliest(goal.region, self.plant)
+            if touched is not None:
+                touched = max(0.0, float(np.nextafter(touched - ahead, -np.inf)))
+                earliest = touched if earliest is None else min(earliest, touched)
             outcome = find_crossings(reach, goal.region)
             if not isinstance(outcome, Missed):
                 first = max(0.0, min(c.time for c in outcome) - ahead)

@@ -292,7 +292,7 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
         if op >= RECIP and op <= ATAN and high - low < np.inf and not R[q] < high - low:
             kinks[q, 0] = TOO_WIDE
             kinks[q, 1] = 0.5 * (low + high)
-        if not R[q] < np.inf:
+        if not (R[q] < np.inf and A[q] < np.inf):
             R[q] = np.inf
             if bad < 0:
                 bad = q

@@ -28,8 +28,8 @@ def some_pair(cases: Sequence[Case]) -> Verdict:
     if certified:
         verdicts = [v for _, _, v in certified]
         times = [v.time for v in verdicts if v.time is not None]
-        return Verdict(
-            status=Status.CERTIFIED,
+        return replace(
+            verdicts[0],
             reason=f"certified for {len(certified)} of {count} pairs of references, {_told(certified[0])}",
             time=(min(t[0] for t in times), max(t[1] for t in times)) if times else None,
             margin=_smallest(v.margin for v in verdicts),
@@ -81,8 +81,8 @@ def every_member(cases: Sequence[tuple[Parameter, Verdict]]) -> Verdict:
             slack=_least_slack(verdicts),
             tracking=_widest(verdicts),
         )
-    return Verdict(
-        status=Status.CERTIFIED,
+    return replace(
+        verdicts[0],
         reason=f"certified for all {count} references",
         margin=_smallest(v.margin for v in verdicts),
         slack=_least_slack(verdicts),

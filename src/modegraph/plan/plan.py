@@ -9,6 +9,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from modegraph.certify.proof import only_entered
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.errors import ModegraphError, NotBuiltYet
@@ -186,10 +187,7 @@ def _cost(objective: Objective, cost: Cost, margin: float | None, switches: int)
 def _goal_check(graph: ModeGraph, node: Node) -> Verdict:
     name, _ = node
     if isinstance(graph.modes[name], Target):
-        return Verdict(
-            Status.CERTIFIED,
-            f"target {name!r} is only entered: the constraints are proved up to the entry, nothing after it",
-        )
+        return only_entered(name)
     return graph.node_check(node)
 
 

@@ -223,6 +223,10 @@ class Flow:
 
     def advance(self, limit: float) -> bool:
         """One step towards ``limit``; False when the flowpipe has failed."""
+        with np.errstate(all="ignore"):
+            return self._advance(limit)
+
+    def _advance(self, limit: float) -> bool:
         if self.failure is not None:
             return False
         fld = self.fields[self.segment]

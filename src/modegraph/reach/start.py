@@ -25,6 +25,9 @@ from .field import cover
 
 Floats = NDArray[np.float64]
 
+UNDERFLOW = 2.0**-1000
+"""More than any sum of products can lose below the normal range."""
+
 
 @dataclass(frozen=True)
 class Chart:
@@ -145,10 +148,10 @@ class Piece:
             for _ in range(3):
                 for a, bound in zip(A, b, strict=True):
                     low = np.where(a > 0.0, a * lo[:m], a * hi[:m])
-                    slack = 4.0 * (m + 2) * UNIT * (np.abs(a).sum() + abs(bound))
+                    slack = 4.0 * (m + 2) * UNIT * (np.abs(a).sum() + abs(bound)) + UNDERFLOW
                     if low.sum() - slack > bound:
                         return None
-                    for v in np.flatnonzero(a):
+                    for v in np.flatnonzero(np.abs(a) > np.sqrt(UNDERFLOW)):
                         rest = (bound + slack - (low.sum() - low[v])) / a[v]
                         rest += np.sign(a[v]) * 4.0 * UNIT * (abs(rest) + 1.0)
                         if a[v] > 0.0:
@@ -216,16 +219,31 @@ def _chart(start: Set) -> tuple[Floats, Floats, bool, tuple[Floats, Floats] | No
     axes = np.diag(radius)[:, free]
     faces = None
     if isinstance(start, Polytope):
-        A = np.array(start.A, float)
+        A, b = _scaled_faces(np.array(start.A, float), np.array(start.b, float))
         scaled = A @ axes
         size = np.abs(A) @ (np.abs(centre) + radius)
-        bound = np.array(start.b, float) - A @ centre
-        faces = scaled, bound + 8.0 * (len(lo) + 4) * UNIT * (size + np.abs(start.b))
+        bound = b - A @ centre
+        # Relative rounding, and an absolute allowance for products below the normal range.
+        faces = scaled, bound + 8.0 * (len(lo) + 4) * UNIT * (size + np.abs(b)) + UNDERFLOW
     elif not isinstance(start, Box):
         raise ModegraphError(
             f"a {type(start).__name__} cannot be a start set yet; use a Box, Ball, Ellipsoid, Zonotope or Polytope"
         )
     return centre, axes, False, faces
+
+
+def _scaled_faces(A: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """The same faces with rows of size near one: exact multiplications by powers of two."""
+    top = np.abs(A).max(axis=1, initial=0.0)
+    keep = top > 0.0
+    A, b = A[keep], b[keep]
+    shift = -np.frexp(top[keep])[1]
+    with np.errstate(over="ignore"):
+        scaled, bound = np.ldexp(A, shift[:, None]), np.ldexp(b, shift)
+    # A bound too large for a double cuts nothing; entries lost far below the largest are an allowance.
+    lost = np.abs(np.ldexp(scaled, -shift[:, None]) - A).max(axis=1) > 0.0
+    fine = np.isfinite(bound) & ~lost
+    return scaled[fine], bound[fine]
 
 
 def _ellipsoid_axes(start: Ellipsoid) -> Floats:
