@@ -60,7 +60,6 @@ class Reach:
         self.times = times
         self.usable = min(self.proved, int(np.searchsorted(times, limit, side="right")) - 1)
         self.reset = reset
-        self._sets: list[tuple[Floats, Floats]] = []
         self._targets: dict[int, tuple[Floats, list[Floats]]] = {}
 
     def sets(self, dim: int) -> tuple[Floats, list[Floats]]:

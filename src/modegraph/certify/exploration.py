@@ -175,14 +175,7 @@ class Exploration:
 
     def _finish(self, found: Findings, parts: Sequence[Findings]) -> None:
         for j, others in found.waiting.items():
-            proof = together([*others, *(part.proofs.get(j) for part in parts)])
-            if proof is not None:
-                found.proofs[j] = proof
-                found.missed.pop(j, None)
-            else:
-                missed = [part.missed[j] for part in parts if j in part.missed]
-                if missed:
-                    found.missed[j] = max(missed, key=lambda m: m.gauge)
+            _settle(found, j, together([*others, *(part.proofs.get(j) for part in parts)]), parts)
         if found.waiting_safety is not None:
             found.safety = safe_together([*found.waiting_safety, *(part.safety for part in parts)])
         for part in parts:
@@ -378,10 +371,8 @@ class Exploration:
         slack = [slack_until(f, len(f.steps)) for f in before]
         seen = [Reach(f, self.horizon, goal.reset).earliest(goal.region, self.plant) for f in before]
         earliest = min((t for t in seen if t is not None), default=None)
-        # A part that was parked early is ahead of the clock of the common flow.
-        ahead = flows[0].times[0] - min((f.time for f in before[-1:] or ()), default=flows[0].times[0])
-        if len(before) > 2:
-            ahead = flows[0].times[0] - min(f.times[0] for f in before)
+        # Of several chains (each parked twice) some are ahead of the clock of their common flow.
+        ahead = float(flows[0].times[0]) if len(before) > 2 else 0.0
         for flow in flows:
             reach = Reach(flow, self.horizon, goal.reset)
             touched = reach.earliest(goal.region, self.plant)
@@ -427,9 +418,9 @@ class Exploration:
 
     def _unproved(self, flow: Flow, proved: int) -> str:
         if proved < 0:
-            upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, 0)
-            names = flow.fields[0].faces
-            when = "at t = 0"
+            upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+            names = flow.fields[flow.first_segment].faces
+            when = f"at t = {flow.times[0]:.4g}"
         else:
             step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
             upper, names = step.face_upper, flow.fields[step.segment].faces
@@ -456,6 +447,17 @@ def _count(m: int, degree: int) -> int:
     return count
 
 
+def _settle(found: Findings, j: int, proof: SwitchProof | None, parts: Sequence[Findings]) -> None:
+    """Record the proof of a goal for the whole, or the worst miss among its parts."""
+    if proof is not None:
+        found.proofs[j] = proof
+        found.missed.pop(j, None)
+        return
+    missed = [part.missed[j] for part in parts if j in part.missed]
+    if missed:
+        found.missed[j] = max(missed, key=lambda m: m.gauge)
+
+
 def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:
     """What the parts prove together is proved of the whole; what some wait for, the whole waits for."""
     found.parked = [flow for part in parts for flow in part.parked]
@@ -466,14 +468,7 @@ def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], sa
             done = [part.proofs[j] for part in parts if j in part.proofs]
             found.waiting[j] = done + [proof for part in parts for proof in part.waiting.get(j, [])]
             continue
-        proof = together([part.proofs.get(j) for part in parts])
-        if proof is not None:
-            found.proofs[j] = proof
-            found.missed.pop(j, None)
-        else:
-            missed = [part.missed[j] for part in parts if j in part.missed]
-            if missed:
-                found.missed[j] = max(missed, key=lambda m: m.gauge)
+        _settle(found, j, together([part.proofs.get(j) for part in parts]), parts)
     safe = [part.safety for part in parts if part.safety is not None]
     late = [part.waiting_safety for part in parts if part.waiting_safety is not None]
     if safety and late and len(safe) + len(late) >= len(parts):

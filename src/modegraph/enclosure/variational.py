@@ -317,7 +317,7 @@ def reduce_generators(G, keep):
 
     With b = c a + r: a zeta_a + b zeta_b lies in (1 + |c|) a zeta + r zeta_b for any c, exactly; r goes
     into a box. Columns of neighbouring steps become parallel as they age, so r is small, and no sign
-    is lost. (Merging whole generators into boxes, as the recipe does, was 1.6 times wider after four
+    is lost. (Merging whole generators into boxes was 1.6 times wider after four
     seconds of a disturbed linear loop; a box in the frame of the loop's modes gained nothing.)
     """
     count, n, Nq = G.shape

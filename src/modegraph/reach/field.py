@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expression.derivative import derivative
-from ..expression.evaluate import Evaluator
 from ..expression.ops import CONST, LOG, RECIP, VAR, WHERE
 from ..expression.scalar import Expr, Graph
 from ..expression.simplify import simplify
@@ -90,10 +89,6 @@ class Field:
     @property
     def variables(self) -> int:
         return self.first_d + len(self.unknowns)
-
-    def evaluator(self) -> Evaluator:
-        """Float evaluation of the rates for a batch of points."""
-        return Evaluator(self.rates)
 
 
 @dataclass(frozen=True)

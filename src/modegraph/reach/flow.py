@@ -465,14 +465,6 @@ class Flow:
         lo, hi = self.bounds.ranges(p)
         return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
 
-    def hulls(self) -> tuple[Floats, Floats]:
-        """Boxes (steps + 1, n) of the sets at the grid instants."""
-        sets = [self.state_set(k) for k in range(len(self.steps) + 1)]
-        polynomials = np.stack([p for p, _ in sets])
-        z = np.stack([generator_box(G) for _, G in sets])
-        lo, hi = self.bounds.ranges(polynomials)
-        return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
-
     def swell(self, step: Step) -> Floats:
         """Box (n,) by which the tube of a step exceeds the hull of p at its ends, state coordinates."""
         out = (step.bend + step.tube) * (1.0 + 4.0 * UNIT)

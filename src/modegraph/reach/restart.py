@@ -3,7 +3,7 @@
 The set variables are given up for new ones: what was remainder becomes polynomial. Under a
 disturbance the remainder is as large as the set after a while, and only boxes of it feed the
 nonlinear terms; a contracting loop forgets the loss of the new start. (Without disturbance
-restarting only widens: recipe, section 5.)
+restarting only widens.)
 """
 
 from __future__ import annotations

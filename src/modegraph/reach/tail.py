@@ -1,4 +1,4 @@
-"""All time after some instant: an invariant set around the equilibrium (recipe: restart and return).
+"""All time after some instant: an invariant set around the equilibrium that returns into itself.
 
 A parallelotope B that contains the reach set is taken as a start set of its own; when its flow lies
 inside B again, B is invariant for the sampled loop, and the flow in between covers all later time.
