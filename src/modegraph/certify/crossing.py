@@ -88,7 +88,7 @@ class Reach:
             radius[: len(x)] = generator_box(G)
             z, off, _ = self.flow.evaluate(self.reset, inputs, radius)
             joint.append(np.vstack([x, z]))
-            grown = np.zeros((len(G) + k, len(x) + k, self.flow.small))
+            grown = np.zeros((len(G) + k, len(x) + k, G.shape[2]))
             grown[: len(G), : len(x)] = G
             grown[len(G) + np.arange(k), len(x) + np.arange(k), 0] = off
             sets.append(grown)

@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cores import in_parallel
 from ..expression.tape import Tape
 from ..reach.chain import nonlinear_variable
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
+from ..reach.framing import generator_box
 from ..reach.parallelotope import mode_gap
 from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
@@ -33,6 +36,8 @@ DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 TOO_MUCH_FEEDBACK = 0.5
+WORTH_A_TAIL = 0.7
+"""An invariant set is looked for again when the reach set is smaller by this factor."""
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
@@ -202,9 +207,9 @@ class Exploration:
         flow = found.flow
         assert flow is not None
         variable = nonlinear_variable(flow) if cut_short else widest_variable(flow.bounds, flow.set_at(0)[0])
+        pieces = piece.split(variable)
         children: list[Findings] = []
-        for child in piece.split(variable):
-            part = self.explore(child, again, check_again, effort)
+        for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
             children.append(part)
             if not _better(part, found, again, check_again):
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
@@ -254,6 +259,7 @@ class Exploration:
         previous = dict.fromkeys(wanted, np.inf)
         pending = list(wanted)
         checkpoint = 8
+        tried = np.inf
         taken = len(flow.steps)
         while flow.time < end and time.monotonic() < self.deadline:
             if not flow.advance(end):
@@ -274,7 +280,8 @@ class Exploration:
                 continue
             checkpoint = int(taken * 1.25) + 4
             self.tick(f"t = {flow.time:.3g} s")
-            if tail is None and flow.time >= start:
+            if tail is None and flow.time >= start and (size := set_size(flow)) < WORTH_A_TAIL * tried:
+                tried = size
                 search = TailSearch(
                     flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
                 )
@@ -430,6 +437,15 @@ class Exploration:
         k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
         by = f"exceeded by up to {upper[k]:.3g}" if np.isfinite(upper[k]) else "not defined on the whole set"
         return f"constraint '{names[k]}' cannot be proved {when} ({by})"
+
+
+def set_size(flow: Flow) -> float:
+    """Half-width of the last set of a flow, in the state where it is largest relative to the starts (floats)."""
+    p, G = flow.state_set(len(flow.steps))
+    start, slack = flow.state_set(0)
+    own = np.abs(start[:, 1:]).sum(axis=1) + generator_box(slack)
+    now = np.abs(p[:, 1:]).sum(axis=1) + generator_box(G)
+    return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))
 
 
 def _better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -14,6 +13,7 @@ from typing import Any
 
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
+from modegraph.cores import COUNT, one_core
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.graph.progress import Progress, reporting
@@ -142,7 +142,7 @@ class _Work:
     lock: Any = field(default_factory=Lock)
 
     def run(self) -> list[UnitResult]:
-        threads = max(1, min(os.cpu_count() or 1, len(self.units)))
+        threads = max(1, min(COUNT, len(self.units)))
         self.end = time.monotonic() + self.budget
         self.waiting = len(self.units)
         self.threads = threads
@@ -190,14 +190,15 @@ class _Work:
                 self.report(self.done, len(self.units), f"{unit.mode.name}: {text}")
 
         try:
-            return certify_unit(
-                unit.mode,
-                unit.parameter,
-                list(unit.targets),
-                horizon=unit.horizon,
-                deadline=deadline,
-                progress=progress,
-            )
+            with one_core():
+                return certify_unit(
+                    unit.mode,
+                    unit.parameter,
+                    list(unit.targets),
+                    horizon=unit.horizon,
+                    deadline=deadline,
+                    progress=progress,
+                )
         except (ModegraphError, _Stopped):
             raise
         except Exception as error:

@@ -23,7 +23,7 @@ from ..expression.tape import Tape
 from .bounds import PolynomialBounds
 from .error_table import error_table
 from .field import Field
-from .framing import generator_box, into_frame, out_of_frame
+from .framing import generator_box, into_frame, out_of_frame, thinned
 from .grid import next_instant
 from .records import Failure, Order, Step
 from .start import Piece
@@ -348,6 +348,9 @@ class Flow:
         self.steps.append(
             Step(self.time, t1, p, G, tube, bend, face_upper, self._energy, self._energy_radius, tracking, self.segment)
         )
+        if len(self.steps) > 1:
+            # Only the last remainder goes on; of the others the targets need no more than this.
+            self.steps[-2].G = thinned(self.steps[-2].G, 1 + self.piece.variables)
         self._p, self._G, self._ebox, self.time = p, G, tube, t1
         if t1 >= fld.end:
             self.segment += 1

@@ -32,3 +32,14 @@ def generator_box(G: Floats) -> Floats:
     """Radii (n,) of a box around sum_g G_g(xi) zeta_g, rounded up."""
     count = G.shape[0] * G.shape[2]
     return np.asarray(np.abs(G).sum(axis=(0, 2)) * (1.0 + (count + 4) * UNIT * 2.0))
+
+
+def thinned(G: Floats, kept: int) -> Floats:
+    """Generators that hold the same sets with the first ``kept`` coefficients only; boxes for the others."""
+    if G.shape[2] <= 2 * kept:
+        return G
+    n = G.shape[1]
+    out = np.zeros((len(G) + n, n, kept))
+    out[: len(G)] = G[:, :, :kept]
+    out[len(G) + np.arange(n), np.arange(n), 0] = generator_box(G[:, :, kept:])
+    return out
