@@ -16,7 +16,7 @@ import modegraph
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "modegraph"
-LAYERS = ["errors", "expression", "enclosure", "model", "reach", "certify", "graph", "plan", "run", "report"]
+LAYERS = ["errors", "cores", "expression", "enclosure", "model", "reach", "certify", "graph", "plan", "run", "report"]
 MODULES = sorted(SOURCE.rglob("*.py"))
 
 

@@ -113,7 +113,7 @@ def test_the_budget_ends(engine: Engine) -> None:
 
 
 def test_every_unit_gets_its_share_of_the_budget(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(build_module.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(build_module, "COUNT", 2)
     shares = []
 
     def fake(mode: Any, p: Any, targets: Any, *, deadline: float, **_: Any) -> UnitResult:
@@ -127,7 +127,7 @@ def test_every_unit_gets_its_share_of_the_budget(engine: Engine, monkeypatch: py
 
 
 def test_an_interrupt_keeps_what_was_decided(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(build_module.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(build_module, "COUNT", 1)
 
     def fake(mode: Any, p: Any, targets: Any, *, progress: Any, **_: Any) -> UnitResult:
         while mode.name == "b":

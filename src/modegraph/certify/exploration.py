@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -22,6 +22,7 @@ from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
 from .evidence import sampled_violation, slack_until
+from .findings import Findings, better, merge, settle
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
 
@@ -52,28 +53,6 @@ class Goal:
     reset: Tape | None
 
 
-@dataclass
-class Findings:
-    """What one part of the starts showed: a proof or the best miss for each goal, and for the check."""
-
-    proofs: dict[int, SwitchProof] = field(default_factory=dict)
-    missed: dict[int, Missed] = field(default_factory=dict)
-    safety: SafetyProof | None = None
-    safe_until: float = 0.0
-    tail_reason: str = ""
-    failure: str = ""
-    unproved: str = ""
-    broken: bool = False
-    """A sampled start really breaks a constraint: smaller parts cannot help."""
-    flow: Flow | None = None
-    last: Flow | None = None
-    parked: list[Flow] = field(default_factory=list)
-    """Flows that wait for a common restart, because the disturbance has filled them."""
-    waiting: dict[int, list[SwitchProof]] = field(default_factory=dict)
-    """Goals that depend on the parked flows, with the proofs of the other parts."""
-    waiting_safety: list[SafetyProof] | None = None
-
-
 class Exploration:
     """Parts, orders and budgets of one (mode, reference)."""
 
@@ -97,8 +76,8 @@ class Exploration:
         self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
         self.deadline, self.tick = deadline, tick
         self.parts = 0
-        self.continued: dict[int, Flow] = {}
-        self.chains: dict[int, Findings] = {}
+        self.continued: dict[Flow, Flow] = {}
+        self.chains: dict[Flow, Findings] = {}
         self.linear = all(f.linear for f in fields)
 
     # -- orders ----------------------------------------------------------------------------------
@@ -121,7 +100,7 @@ class Exploration:
         """Decide the wanted goals and the check for all starts."""
         found = self.explore(piece, wanted, safety=True)
         if found.parked:
-            chains = [self.chains[id(flow)] for flow in found.parked]
+            chains = [self.chains[flow] for flow in found.parked]
             parts = [part for part in chains if not part.parked]
             open_chains = [part for part in chains if part.parked]
             # Parts of a loop that does not depend on time may go on together, from the latest of
@@ -136,7 +115,7 @@ class Exploration:
         """Go on with a parked flow until it is decided or wants another restart; undo the parking where
         that breaks down: its part of the starts is too large then."""
         flow = found.parked[0]
-        part = self._follow([self.continued[id(flow)]], [flow], found, park=True)
+        part = self._follow([self.continued[flow]], [flow], found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
             why = (
@@ -147,7 +126,7 @@ class Exploration:
             found.parked, found.waiting, found.waiting_safety = [], {}, None
             found.failure = f"{why}; a smaller start set or disturbance would help"
             return
-        self.chains[id(flow)] = part
+        self.chains[flow] = part
 
     def _follow(self, flows: list[Flow], before: list[Flow], found: Findings, park: bool) -> Findings:
         wanted = list(found.waiting)
@@ -162,7 +141,7 @@ class Exploration:
         """Chains that want another restart, together, or in halves where all of them are too much."""
         ends = [part.parked[-1] for part in open_chains]
         before = [flow for part in open_chains for flow in part.parked]
-        following = self.continued[id(ends[0])] if len(ends) == 1 else self._again(ends, self._end())
+        following = self.continued[ends[0]] if len(ends) == 1 else self._again(ends, self._end())
         if following is None:
             part = Findings(flow=ends[0], last=ends[-1], failure="the reach set cannot be enclosed again")
         else:
@@ -180,7 +159,7 @@ class Exploration:
 
     def _finish(self, found: Findings, parts: Sequence[Findings]) -> None:
         for j, others in found.waiting.items():
-            _settle(found, j, together([*others, *(part.proofs.get(j) for part in parts)]), parts)
+            settle(found, j, together([*others, *(part.proofs.get(j) for part in parts)]), parts)
         if found.waiting_safety is not None:
             found.safety = safe_together([*found.waiting_safety, *(part.safety for part in parts)])
         for part in parts:
@@ -200,8 +179,8 @@ class Exploration:
             return found
         cut_short = bool(found.failure or found.unproved)
         if cut_short and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
-            better = self.explore(piece, again, check_again, effort + 1)
-            return _merge(found, [better], again, check_again)
+            second = self.explore(piece, again, check_again, effort + 1)
+            return merge(found, [second], again, check_again)
         if piece.depth >= DEEPEST_CUT or piece.variables == 0:
             return found
         flow = found.flow
@@ -211,10 +190,10 @@ class Exploration:
         children: list[Findings] = []
         for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
             children.append(part)
-            if not _better(part, found, again, check_again):
+            if not better(part, found, again, check_again):
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
                 return found
-        return _merge(found, children, again, check_again)
+        return merge(found, children, again, check_again)
 
     def _worth_refining(self, found: Findings, left: Sequence[int], safety: bool) -> tuple[list[int], bool]:
         """Goals for which smaller parts may succeed, and whether the check may."""
@@ -272,7 +251,7 @@ class Exploration:
                 following = self._again([flow], end, first=len(flows) == 1 and flow.piece.chart.original)
                 if following is not None:
                     if park:
-                        self.continued[id(flow)] = following
+                        self.continued[flow] = following
                         return tail, reason, True
                     flows.append(following)
                     flow = following
@@ -302,7 +281,7 @@ class Exploration:
                 if following is None:
                     break
                 if park:
-                    self.continued[id(flow)] = following
+                    self.continued[flow] = following
                     return tail, reason, True
                 flows.append(following)
                 flow = following
@@ -448,53 +427,8 @@ def set_size(flow: Flow) -> float:
     return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))
 
 
-def _better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:
-    """Whether a part of the starts got further than the whole did."""
-    if any(j in part.proofs or j in part.waiting for j in wanted) or (safety and part.safety is not None):
-        return True
-    closer = any(part.missed[j].gauge < 0.9 * whole.missed[j].gauge for j in wanted if j in part.missed)
-    return closer or part.safe_until > 1.1 * whole.safe_until
-
-
 def _count(m: int, degree: int) -> int:
     count = 1
     for k in range(1, degree + 1):
         count = count * (m + k) // k
     return count
-
-
-def _settle(found: Findings, j: int, proof: SwitchProof | None, parts: Sequence[Findings]) -> None:
-    """Record the proof of a goal for the whole, or the worst miss among its parts."""
-    if proof is not None:
-        found.proofs[j] = proof
-        found.missed.pop(j, None)
-        return
-    missed = [part.missed[j] for part in parts if j in part.missed]
-    if missed:
-        found.missed[j] = max(missed, key=lambda m: m.gauge)
-
-
-def _merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:
-    """What the parts prove together is proved of the whole; what some wait for, the whole waits for."""
-    found.parked = [flow for part in parts for flow in part.parked]
-    for j in wanted:
-        if j in found.proofs:
-            continue
-        if all(j in part.proofs or j in part.waiting for part in parts) and any(j in part.waiting for part in parts):
-            done = [part.proofs[j] for part in parts if j in part.proofs]
-            found.waiting[j] = done + [proof for part in parts for proof in part.waiting.get(j, [])]
-            continue
-        _settle(found, j, together([part.proofs.get(j) for part in parts]), parts)
-    safe = [part.safety for part in parts if part.safety is not None]
-    late = [part.waiting_safety for part in parts if part.waiting_safety is not None]
-    if safety and late and len(safe) + len(late) >= len(parts):
-        found.waiting_safety = safe + [proof for proofs in late for proof in proofs]
-    elif safety:
-        found.safety = safe_together([part.safety for part in parts])
-        if found.safety is None:
-            found.safe_until = max(found.safe_until, min(part.safe_until for part in parts))
-    if all(not part.failure for part in parts):
-        found.failure = ""
-    if all(not part.unproved for part in parts):
-        found.unproved = ""
-    return found

@@ -1,0 +1,77 @@
+"""What parts of one start set show, and what they show together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ..reach.flow import Flow
+from .crossing import Missed
+from .proof import SafetyProof, SwitchProof, safe_together, together
+
+
+@dataclass
+class Findings:
+    """What one part of the starts showed: a proof or the best miss for each goal, and for the check."""
+
+    proofs: dict[int, SwitchProof] = field(default_factory=dict)
+    missed: dict[int, Missed] = field(default_factory=dict)
+    safety: SafetyProof | None = None
+    safe_until: float = 0.0
+    tail_reason: str = ""
+    failure: str = ""
+    unproved: str = ""
+    broken: bool = False
+    """A sampled start really breaks a constraint: smaller parts cannot help."""
+    flow: Flow | None = None
+    last: Flow | None = None
+    parked: list[Flow] = field(default_factory=list)
+    """Flows that wait for a common restart, because the disturbance has filled them."""
+    waiting: dict[int, list[SwitchProof]] = field(default_factory=dict)
+    """Goals that depend on the parked flows, with the proofs of the other parts."""
+    waiting_safety: list[SafetyProof] | None = None
+
+
+def better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:
+    """Whether a part of the starts got further than the whole did."""
+    if any(j in part.proofs or j in part.waiting for j in wanted) or (safety and part.safety is not None):
+        return True
+    closer = any(part.missed[j].gauge < 0.9 * whole.missed[j].gauge for j in wanted if j in part.missed)
+    return closer or part.safe_until > 1.1 * whole.safe_until
+
+
+def settle(found: Findings, j: int, proof: SwitchProof | None, parts: Sequence[Findings]) -> None:
+    """Record the proof of a goal for the whole, or the worst miss among its parts."""
+    if proof is not None:
+        found.proofs[j] = proof
+        found.missed.pop(j, None)
+        return
+    missed = [part.missed[j] for part in parts if j in part.missed]
+    if missed:
+        found.missed[j] = max(missed, key=lambda m: m.gauge)
+
+
+def merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:
+    """What the parts prove together is proved of the whole; what some wait for, the whole waits for."""
+    found.parked = [flow for part in parts for flow in part.parked]
+    for j in wanted:
+        if j in found.proofs:
+            continue
+        if all(j in part.proofs or j in part.waiting for part in parts) and any(j in part.waiting for part in parts):
+            done = [part.proofs[j] for part in parts if j in part.proofs]
+            found.waiting[j] = done + [proof for part in parts for proof in part.waiting.get(j, [])]
+            continue
+        settle(found, j, together([part.proofs.get(j) for part in parts]), parts)
+    safe = [part.safety for part in parts if part.safety is not None]
+    late = [part.waiting_safety for part in parts if part.waiting_safety is not None]
+    if safety and late and len(safe) + len(late) >= len(parts):
+        found.waiting_safety = safe + [proof for proofs in late for proof in proofs]
+    elif safety:
+        found.safety = safe_together([part.safety for part in parts])
+        if found.safety is None:
+            found.safe_until = max(found.safe_until, min(part.safe_until for part in parts))
+    if all(not part.failure for part in parts):
+        found.failure = ""
+    if all(not part.unproved for part in parts):
+        found.unproved = ""
+    return found

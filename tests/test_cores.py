@@ -1,0 +1,35 @@
+"""Work shared among the cores."""
+
+import threading
+
+import pytest
+
+from modegraph import cores
+
+
+def test_results_come_in_order() -> None:
+    assert list(cores.in_parallel([lambda k=k: k * k for k in range(6)])) == [k * k for k in range(6)]
+
+
+def test_tasks_run_together_where_a_core_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cores, "_FREE", threading.BoundedSemaphore(1))
+    met = threading.Barrier(2, timeout=20.0)
+    assert sorted(cores.in_parallel([met.wait, met.wait])) == [0, 1]
+
+
+def test_without_a_free_core_they_run_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cores, "_FREE", threading.BoundedSemaphore(1))
+    with cores.one_core():
+        names = list(cores.in_parallel([threading.current_thread, threading.current_thread]))
+    assert names == [threading.current_thread()] * 2
+
+
+def test_an_error_reaches_the_caller_and_gives_the_core_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cores, "_FREE", threading.BoundedSemaphore(1))
+
+    def fails() -> int:
+        raise ValueError("of this task")
+
+    with pytest.raises(ValueError, match="of this task"):
+        list(cores.in_parallel([lambda: 1, fails]))
+    assert cores._FREE.acquire(timeout=20.0)
