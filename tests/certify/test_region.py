@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.region import Region, largest_singular_value
+from modegraph.certify.region import Region
 from modegraph.enclosure.monomials import monomials
 from modegraph.model.sets import Set
 from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.quadric import largest_singular_value
 from modegraph.reach.start import whole
 
 SCALES = [1e-150, 1e-3, 1.0, 1e150]

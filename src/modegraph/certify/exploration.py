@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..cores import in_parallel
 from ..expression.tape import Tape
 from ..reach.chain import nonlinear_variable
+from ..reach.decay import SettledLoop
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
 from ..reach.framing import generator_box
@@ -25,6 +26,7 @@ from .evidence import sampled_violation, slack_until
 from .findings import Findings, better, merge, settle
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
+from .sinking import Arrival, Funnels, Sinking
 
 Floats = NDArray[np.float64]
 
@@ -79,6 +81,19 @@ class Exploration:
         self.continued: dict[Flow, Flow] = {}
         self.chains: dict[Flow, Findings] = {}
         self.linear = all(f.linear for f in fields)
+        self._funnels: dict[tuple[float, ...], Funnels] = {}
+
+    def funnels(self, piece: Piece) -> Funnels | None:
+        """Funnels for the unknowns of a piece; None where the loop never stops depending on time."""
+        last = self.fields[-1]
+        if not (last.autonomous and np.isinf(last.end)):
+            return None
+        ranges = [piece.unknown_range(i) for i in range(len(piece.chart.unknown_lo))]
+        key = tuple(v for pair in ranges for v in pair)
+        if key not in self._funnels:
+            lo, hi = (np.array([pair[side] for pair in ranges]) for side in (0, 1))
+            self._funnels[key] = Funnels(SettledLoop(last, self.w_centre, self.w_radius, lo, hi))
+        return self._funnels[key]
 
     # -- orders ----------------------------------------------------------------------------------
 
@@ -225,7 +240,7 @@ class Exploration:
 
     def _advance(
         self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool
-    ) -> tuple[Tail | None, str, bool]:
+    ) -> tuple[Tail | Sinking | None, str, bool]:
         """Extend a chain of flows until everything is decided or nothing more can be expected.
 
         Returns the tail, or why there is none, and whether the (first) flow wants to be restarted;
@@ -233,7 +248,8 @@ class Exploration:
         """
         flow = flows[-1]
         start = self.fields[-1].start
-        tail: Tail | None = None
+        tail: Tail | Sinking | None = None
+        decay = np.inf
         reason = ""
         previous = dict.fromkeys(wanted, np.inf)
         pending = list(wanted)
@@ -259,6 +275,8 @@ class Exploration:
                 continue
             checkpoint = int(taken * 1.25) + 4
             self.tick(f"t = {flow.time:.3g} s")
+            now = {j: self._gauge_now(flow, j) for j in pending}
+            pending = [j for j in pending if not now[j] <= 1.0]
             if tail is None and flow.time >= start and (size := set_size(flow)) < WORTH_A_TAIL * tried:
                 tried = size
                 search = TailSearch(
@@ -266,15 +284,20 @@ class Exploration:
                 )
                 outcome = search.attempt([flow])
                 if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
-                    tail = outcome
+                    tail, decay = outcome, outcome.decay
                 else:
                     reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
-            now = {j: self._gauge_now(flow, j) for j in pending}
-            pending = [j for j in pending if not now[j] <= 1.0]
+                    if not pending:
+                        tail = self._sink(flow, pending)
+                        decay = tail.tail().decay if tail is not None else np.inf
             if not pending and (tail is not None or not safety):
                 break
-            settled = tail is not None and np.isfinite(tail.decay) and flow.time > tail.start + SETTLING / tail.decay
+            settled = tail is not None and np.isfinite(decay) and flow.time > tail.start + SETTLING / decay
             if settled and all(now[j] > 0.98 * previous[j] for j in pending):
+                sinking = self._sink(flow, pending)
+                if sinking is not None and any(self._arrives(sinking, j) for j in pending):
+                    tail = sinking
+                    break
                 if flow.frame is not None or self.framed[0].frame is None:
                     break
                 following = self._again([flow], end)
@@ -304,6 +327,18 @@ class Exploration:
         flow.next_restart = len(flow.steps) + RESTART_STEPS
         return None
 
+    def _sink(self, flow: Flow, pending: Sequence[int]) -> Sinking | None:
+        """A funnel that holds the end of a flow and leads into the pending targets if possible."""
+        funnels = self.funnels(flow.piece)
+        if funnels is None or self.linear:
+            return None
+        found = funnels.enter(flow, [self.goals[j].region for j in pending if self.goals[j].reset is None])
+        return found if isinstance(found, Sinking) else None
+
+    def _arrives(self, sinking: Sinking, j: int) -> bool:
+        goal = self.goals[j]
+        return goal.reset is None and isinstance(sinking.arrival(goal.region, self._end()), Arrival)
+
     def _longest_step(self) -> float:
         """A crossing is looked for at the ends of steps only: enough of them within the horizon."""
         return np.inf if self.horizon is None else self.horizon / (LOOKS if self.linear else LOOKS / 2)
@@ -323,7 +358,7 @@ class Exploration:
         self,
         flows: Sequence[Flow],
         wanted: Sequence[int],
-        tail: Tail | None,
+        tail: Tail | Sinking | None,
         tail_reason: str,
         safety: bool,
         before: Sequence[Flow] = (),
@@ -342,16 +377,18 @@ class Exploration:
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)
         found.safe_until = float(flow.times[proved]) if proved >= 0 else float(flow.times[0])
         for j in wanted:
-            outcome = self._crossing(flows, j, before)
+            outcome = self._crossing(flows, j, tail if isinstance(tail, Sinking) else None, before)
             if isinstance(outcome, Missed):
                 found.missed[j] = outcome
             else:
                 found.proofs[j] = outcome
         if safety and proved == len(flow.steps) and flow.failure is None:
-            found.safety = self._safety(flows, tail, before)
+            found.safety = self._safety(flows, tail.tail() if isinstance(tail, Sinking) else tail, before)
         return found
 
-    def _crossing(self, flows: Sequence[Flow], j: int, before: Sequence[Flow] = ()) -> SwitchProof | Missed:
+    def _crossing(
+        self, flows: Sequence[Flow], j: int, sinking: Sinking | None, before: Sequence[Flow] = ()
+    ) -> SwitchProof | Missed:
         goal = self.goals[j]
         best: Missed | None = None
         slack = [slack_until(f, len(f.steps)) for f in before]
@@ -384,7 +421,23 @@ class Exploration:
                 break
             slack.append(slack_until(flow, len(flow.steps)))
         assert best is not None
-        return best
+        last = flows[-1]
+        if sinking is None or goal.reset is not None or proved_instants(last) < len(last.steps):
+            return best
+        arrival = sinking.arrival(goal.region, self._end())
+        if isinstance(arrival, Missed):
+            return replace(best, gauge=arrival.gauge, time=arrival.time) if arrival.gauge < best.gauge else best
+        arrived = float(np.nextafter(sinking.start + arrival.seconds, np.inf))
+        spent = float(last.seen_bounds.upper(last.steps[-1].energy) + last.steps[-1].energy_radius)
+        return SwitchProof(
+            earliest=max(0.0, sinking.start - ahead) if earliest is None else earliest,
+            latest=arrived,
+            margin=1.0 - arrival.best,
+            window=np.inf,
+            energy=float(np.nextafter(spent + arrival.energy, np.inf)),
+            slack=least_slack([*slack, sinking.slack()]),
+            parts=1,
+        )
 
     def _safety(self, flows: Sequence[Flow], tail: Tail | None, before: Sequence[Flow] = ()) -> SafetyProof | None:
         flow = flows[-1]

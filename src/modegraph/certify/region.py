@@ -6,7 +6,6 @@ A set with faces {x : a'x <= b} is tested face by face; a ball or ellipsoid thro
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -17,11 +16,9 @@ from ..enclosure.rounding import UNIT
 from ..errors import ModegraphError
 from ..model.sets import Ball, Box, Ellipsoid, Polytope, Set, Zonotope, exact
 from ..reach.bounds import PolynomialBounds
+from ..reach.quadric import Quadric, generator_sizes
 
 Floats = NDArray[np.float64]
-
-MOST_CORNERS = 8
-"""Boxes of up to this many variables are bounded corner by corner in a quadric."""
 
 
 class Region:
@@ -71,20 +68,21 @@ class Region:
         self.centre = np.array(target.c, float)
         if isinstance(target, Ball):
             self.T = np.eye(n) * (1.0 / float(target.radius))
-            self.grow, self.shrink = 1.0 + 4.0 * UNIT, 1.0 - 4.0 * UNIT
+            self.grow = 1.0 + 4.0 * UNIT
+            self.quadric = Quadric(self.centre, self.T, self.grow)
             return
         shape = np.array(target.shape, float)
         scale = np.sqrt(np.diag(shape))
         correlation = shape / np.outer(scale, scale)
         self.T = np.linalg.inv(np.linalg.cholesky(correlation)) / scale
-        # shape^-1 <= T'T / lambda_min(T shape T'), and >= T'T / lambda_max.
+        # shape^-1 <= T'T / lambda_min(T shape T').
         product = self.T @ shape @ self.T.T
         miss = np.abs(product - np.eye(n)) + 4.0 * n * UNIT * (np.abs(self.T) @ np.abs(shape) @ np.abs(self.T.T))
         off = float(miss.sum(axis=1).max()) * (1.0 + 8.0 * n * UNIT)
         if not off < 0.01:
             raise ModegraphError("the target ellipsoid's shape is too close to singular; scale its coordinates")
         self.grow = (1.0 + off) * (1.0 + 4.0 * UNIT)
-        self.shrink = (1.0 - off) * (1.0 - 4.0 * UNIT)
+        self.quadric = Quadric(self.centre, self.T, self.grow)
 
     # -- containment -----------------------------------------------------------------------------
 
@@ -104,63 +102,17 @@ class Region:
             return out
         if self._faces is not None:
             q = np.einsum("fi,kin->kfn", self.A, p)
-            spread = _generator_sizes(self.A, generators)
+            spread = generator_sizes(self.A, generators)
             reach = bounds.upper(q) + spread
             rounding = 4.0 * (n + 4) * UNIT * (size @ np.abs(self.A).T + spread)
-            rounding += (size + _generator_sizes(np.eye(n), generators)) @ self.dA.T * 1.001
+            rounding += (size + generator_sizes(np.eye(n), generators)) @ self.dA.T * 1.001
             slack = self.b - (reach + rounding)
             slack = slack - 2.0 * UNIT * (np.abs(self.b) + np.abs(reach))
             worst = 1.0 - slack / self.distance
             # Rounding of the division must not turn a miss into a proof.
             worst = np.where(slack >= 0.0, np.minimum(worst, 1.0), np.maximum(worst, np.nextafter(1.0, 2.0)))
             return np.asarray(np.where(np.isnan(worst), np.inf, worst).max(axis=1))
-        shifted = p.copy()
-        shifted[:, :, 0] -= self.centre
-        y = np.einsum("fi,kin->kfn", self.T, shifted)
-        error = 4.0 * (n + 4) * UNIT * ((size + np.abs(self.centre)) @ np.abs(self.T).T)
-        z = _generator_sizes(self.T, generators) * (1.0 + 4.0 * n * UNIT) + error
-        lo, hi = bounds.ranges(y)
-        hull = np.sqrt((np.maximum(np.abs(lo - z), np.abs(hi + z)) ** 2).sum(axis=1))
-        linear = self._linear_gauge(bounds, y, z)
-        gauge = np.fmin(hull, linear) * self.grow * (1.0 + 8.0 * (n + 4) * UNIT)
-        return np.asarray(np.where(np.isnan(gauge), np.inf, gauge))
-
-    def _linear_gauge(self, bounds: PolynomialBounds, y: Floats, z: Floats) -> Floats:
-        """sup |y0 + Y eta + rest|_2 with the linear part kept together; inf where that is too costly."""
-        piece = bounds.piece
-        Y = bounds.linear_part(y)
-        below, above = bounds.nonlinear_radius(y)
-        middle = 0.5 * (below + above)
-        constant = y[:, :, 0] + middle
-        rest = 0.5 * (above - below) + z + 4.0 * UNIT * (np.abs(constant) + np.abs(middle))
-        m = piece.chart.free
-        if piece.chart.round and m > 0:
-            others = np.abs(Y[:, :, m:]).sum(axis=2)
-            with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-                plain = Y[:, :, :m] / piece.radius[:m]
-                start = constant - plain @ piece.middle[:m]
-            head = np.full(len(y), np.inf)
-            fine = np.isfinite(plain).all(axis=(1, 2)) & (np.abs(plain).max(axis=(1, 2), initial=0.0) < 1e100)
-            if fine.any():
-                size = np.abs(plain[fine]).sum(axis=(1, 2)) + np.abs(constant[fine]).sum(axis=1)
-                head[fine] = np.sqrt((start[fine] ** 2).sum(axis=1)) + largest_singular_value(plain[fine])
-                head[fine] += 16.0 * (m + self.dim + 4) * UNIT * size
-            total = head + np.sqrt(((rest + others) ** 2).sum(axis=1))
-            if m <= MOST_CORNERS and piece.depth > 0:
-                total = np.fmin(total, self._corner_gauge(constant, Y, rest))
-            return np.asarray(total)
-        return self._corner_gauge(constant, Y, rest)
-
-    def _corner_gauge(self, constant: Floats, Y: Floats, rest: Floats) -> Floats:
-        m = Y.shape[2]
-        if m > MOST_CORNERS:
-            return np.full(len(Y), np.inf)
-        # |y0 + Y eta|_2 is convex: largest at a corner; eta and -eta both count.
-        corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * m, indexing="ij")).reshape(m, -1) if m else np.zeros((0, 1))
-        values = constant[:, :, None] + Y @ corners
-        size = np.abs(constant).sum(axis=1) + np.abs(Y).sum(axis=(1, 2))
-        head = np.sqrt((values**2).sum(axis=1)).max(axis=1) + 8.0 * (m + self.dim + 4) * UNIT * size
-        return np.asarray(head + np.sqrt((rest**2).sum(axis=1)))
+        return self.quadric.gauges(bounds, p, generators)
 
     def box_gauges(self, radius: Floats) -> Floats:
         """What adding a box of radii (K, n) can add to the gauge."""
@@ -204,33 +156,3 @@ class Region:
         along = length - (np.abs(y) * spread).sum(axis=1) / length * (1.0 + 8.0 * n * UNIT)
         along = np.maximum(0.0, along * (1.0 - 8.0 * (n + 4) * UNIT))
         return np.asarray(np.maximum(by_box, along**2 * (1.0 - 4.0 * UNIT)) > self.grow**2 * (1.0 + 4.0 * UNIT))
-
-
-def largest_singular_value(Y: Floats) -> Floats:
-    """Upper bounds (K,) of the largest singular value of matrices (K, a, b).
-
-    With B = Y'Y and any V near orthogonal, lambda_max(B) <= |V'BV|_inf / (1 - |V'V - I|_inf).
-    """
-    b = Y.shape[2]
-    B = np.swapaxes(Y, 1, 2) @ Y
-    V = np.linalg.eigh(B)[1]
-    rotated = np.swapaxes(V, 1, 2) @ B @ V
-    size = (Y**2).sum(axis=(1, 2))
-    top = np.abs(rotated).sum(axis=2).max(axis=1) + 16.0 * b * b * (b + Y.shape[1] + 4) * UNIT * size
-    miss = np.abs(np.swapaxes(V, 1, 2) @ V - np.eye(b)).sum(axis=2).max(axis=1) + 8.0 * b * b * UNIT
-    bound = np.sqrt(top / (1.0 - np.minimum(miss, 0.5))) * (1.0 + 8.0 * UNIT)
-    frobenius = np.sqrt(size) * (1.0 + 4.0 * (b * Y.shape[1] + 2) * UNIT)
-    return np.asarray(np.where(miss < 0.5, np.fmin(bound, frobenius), frobenius))
-
-
-def _generator_sizes(A: Floats, generators: Sequence[Floats]) -> Floats:
-    """(K, f): sum_g |A G_kg|_1 for each row of A, rounded up."""
-    n = A.shape[1]
-    out = np.zeros((len(generators), len(A)))
-    for k, G in enumerate(generators):
-        if len(G):
-            product = np.einsum("fi,gin->fgn", A, G[:, :n])
-            size = np.abs(G[:, :n]).sum(axis=(0, 2))
-            slack = 4.0 * (n + 2 + math.log2(G.size + 1)) * UNIT * (np.abs(A) @ size)
-            out[k] = np.abs(product).sum(axis=(1, 2)) * (1.0 + 2.0 * G.size * UNIT) + slack
-    return out

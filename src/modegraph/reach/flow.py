@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.monomials import Monomials, monomials
-from ..enclosure.observe import enclose_at, observe_step
+from ..enclosure.observe import observe_step
 from ..enclosure.rounding import UNIT
 from ..enclosure.step import (
     DONE,
@@ -25,6 +25,7 @@ from .error_table import error_table
 from .field import Field
 from .framing import generator_box, into_frame, out_of_frame, thinned
 from .grid import next_instant
+from .pointwise import evaluate_over, workspace
 from .records import Failure, Order, Step
 from .start import Piece
 
@@ -56,18 +57,6 @@ SHORTER_LOOKS = 4
 """How often a step is cut to a quarter because a constraint cannot be proved between its ends."""
 SMALLEST_STEP = 1e-7
 """A flowpipe stops when its step falls below this part of the time scale of the loop."""
-
-
-def _workspace(tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
-    rows = tape.size
-    return {
-        "P": np.zeros((rows, K + 1, size)),
-        "dg": np.full((rows, K + 1), -1, np.int64),
-        "norms": np.zeros((rows, K + 1, degree + 1)),
-        "R": np.zeros(rows),
-        "kinks": np.zeros((rows, 2)),
-        "ranges": np.full((rows, 2), np.nan),
-    }
 
 
 class Flow:
@@ -178,14 +167,7 @@ class Flow:
 
     def evaluate(self, tape: Tape, inputs: Floats, radius: Floats) -> tuple[Floats, Floats, int]:
         """Outputs of a tape at one instant: polynomials (no, N), radii (no,), first undefined row or -1."""
-        space = _workspace(tape, 0, self.table.size, self.order.degree)
-        cut = np.array([self.order.degree], np.int64)
-        return enclose_at(
-            tape.ops, tape.const, tape.const_rad, tape.outputs, tape.variables,
-            np.ascontiguousarray(inputs), np.ascontiguousarray(radius, float), cut, self.table.pairs,
-            space["P"], space["dg"], space["norms"], space["R"], space["kinks"], space["ranges"],
-            *self.table.arrays,
-        )  # fmt: skip
+        return evaluate_over(tape, self.table, self.order.degree, inputs, radius)
 
     def variables_at(self, t: float, p: Floats, G: Floats, fld: Field) -> tuple[Floats, Floats]:
         """Polynomials (nv, N) and radii (nv,) of all tape variables at one instant."""
@@ -213,7 +195,7 @@ class Flow:
     def _space(self, kind: str, tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
         key = (self.segment, kind)
         if key not in self._spaces:
-            self._spaces[key] = _workspace(tape, K, size, degree)
+            self._spaces[key] = workspace(tape, K, size, degree)
         return self._spaces[key]
 
     def _first_step(self) -> float:
