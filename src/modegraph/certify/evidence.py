@@ -9,10 +9,15 @@ from numpy.typing import NDArray
 
 from ..expression.evaluate import Evaluator
 from ..reach.flow import Flow
+from ..reach.framing import generator_box
 from .crossing import sample_powers
 from .proof import least_slack
+from .verdict import Widths
 
 Floats = NDArray[np.float64]
+
+INSTANTS = 8
+"""Looks at the widths of a flow."""
 
 
 def slack_until(flow: Flow, instant: int) -> dict[str, float]:
@@ -30,6 +35,21 @@ def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
     for name, value in zip(names, upper, strict=True):
         out[name] = min(-float(value), out.get(name, np.inf))
     return out
+
+
+def width_over_time(flows: Sequence[Flow]) -> Widths | None:
+    """Widths at a few instants of flows that follow each other."""
+    times, values = [], []
+    for flow in flows:
+        count = len(flow.steps)
+        for k in sorted({round(j * count / INSTANTS) for j in range(INSTANTS + 1)}):
+            p, G = flow.state_set(k)
+            lo, hi = flow.bounds.ranges(p)
+            times.append(float(flow.times[k]))
+            values.append(hi - lo + 2.0 * generator_box(G))
+    if not times:
+        return None
+    return Widths(tuple(flows[0].names), np.array(times), np.array(values))
 
 
 def sampled_violation(flow: Flow) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..reach.compiled import CompiledMode, compile_mode, compile_reset
 from ..reach.flow import Flow, Order
 from ..reach.tail import Tail, TailSearch
 from .counterexample import Equilibrium, PointRun, Scene, candidate_starts, enclose_equilibrium, trapped_in
-from .evidence import slack_until
+from .evidence import slack_until, width_over_time
 from .exploration import Exploration, Findings, Goal
 from .proof import SwitchProof, certified_check, certified_switch
 from .region import Region
@@ -140,6 +140,11 @@ class _Unit:
                 self.verdicts[k] = self._undecided(found, k)
         if self.check is None:
             self.check = self._unchecked(found)
+        followed = [flow for flow in (found.flow, found.last) if flow is not None]
+        widths = width_over_time(followed if len({*followed}) == len(followed) else followed[:1])
+        self.check = replace(self.check, widths=widths)
+        for k in wanted:
+            self.verdicts[k] = replace(self.verdicts[k], widths=widths)
 
     def _switches_in_zero_time(self) -> None:
         """S_i inside S_j, decided exactly, with the constraints proved at t = 0."""

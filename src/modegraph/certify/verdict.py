@@ -52,6 +52,24 @@ class Witness:
 
 
 @dataclass(frozen=True)
+class Widths:
+    """Widths of a reach set at some instants.
+
+    Attributes
+    ----------
+    states : tuple[str, ...]
+        Names of the coordinates: states, then memory.
+    times : (k,) array, seconds
+    values : (k, n) array
+        Widths (upper bound minus lower bound) in the unit of each state.
+    """
+
+    states: tuple[str, ...]
+    times: Floats
+    values: Floats
+
+
+@dataclass(frozen=True)
 class Verdict:
     """One answer, with the reason and the numbers that belong to it.
 
@@ -78,8 +96,11 @@ class Verdict:
         Certified upper bound of the integral of u'u up to the switch.
     window : float or None
         Seconds: shortest certified stay inside the target from the switch on.
+        Infinite where it stays there for ever.
     tracking : (m,) array or None
         ``check`` only: certified bound of |h(x) - r| over the proved time, per output.
+    widths : Widths or None
+        How wide the reach set was over time, on the part of the starts that was followed last.
     """
 
     status: Status
@@ -93,3 +114,4 @@ class Verdict:
     energy: float | None = None
     window: float | None = None
     tracking: Floats | None = None
+    widths: Widths | None = None

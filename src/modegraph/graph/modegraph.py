@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from modegraph.certify.references import Cell, Parameter, References, parameter_text
-from modegraph.certify.verdict import Status, Verdict
+from modegraph.certify.verdict import Status, Verdict, Widths
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.aggregate import Case, every_member, some_pair
 from modegraph.graph.entry import may_enter, plain_state
@@ -369,12 +370,14 @@ def _explained(i: str, j: str, v: Verdict) -> str:
     for label, value, unit in (
         ("margin", v.margin, ""),
         ("energy", v.energy, ""),
-        ("stays inside", v.window, " s"),
+        ("stays inside", None if v.window == math.inf else v.window, " s"),
         ("examined up to", v.horizon, " s"),
         ("constraints proved up to", v.until, " s"),
     ):
         if value is not None:
             lines.append(f"  {label}: {value:.4g}{unit}")
+    if v.window == math.inf:
+        lines.append("  stays inside: for ever")
     for name, slack in v.slack.items():
         lines.append(f"  slack of {name}: {slack:.4g}")
     if v.witness is not None:
@@ -393,4 +396,18 @@ def _explained(i: str, j: str, v: Verdict) -> str:
             lines.append(f"    with r_i = {parameter_text(w.r_i)}")
         if w.r_j is not None:
             lines.append(f"    with r_j = {parameter_text(w.r_j)}")
+    if v.widths is not None:
+        lines += _widths_table(v.widths)
     return "\n".join(lines)
+
+
+def _widths_table(widths: Widths) -> list[str]:
+    """Lines of a table: one row an instant, one column a state."""
+    columns = [max(len(name), 9) for name in widths.states]
+    lines = ["  width of the reach set over time:"]
+    lines.append(
+        "    " + f"{'t, s':>9s}" + "".join(f"  {n:>{c}s}" for n, c in zip(widths.states, columns, strict=True))
+    )
+    for t, row in zip(widths.times, widths.values, strict=True):
+        lines.append(f"    {t:9.4g}" + "".join(f"  {value:>{c}.4g}" for value, c in zip(row, columns, strict=True)))
+    return lines

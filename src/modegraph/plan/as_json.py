@@ -56,7 +56,10 @@ def verdict_data(v: Verdict) -> dict[str, Any]:
         "energy": v.energy,
         "window": v.window,
         "tracking": v.tracking,
-    }
+        "widths": None if v.widths is None else {
+            "states": list(v.widths.states), "times": v.widths.times, "values": v.widths.values,
+        },
+    }  # fmt: skip
 
 
 def references_data(refs: References) -> list[list[Any]]:
