@@ -17,3 +17,4 @@ def test_thinned_generators_hold_the_same_sets(seed: int) -> None:
         assert np.abs(few.transpose(0, 2, 1) @ row).sum() >= np.abs(G.transpose(0, 2, 1) @ row).sum()
     assert (generator_box(few) >= generator_box(G) * (1.0 - 1e-15)).all()
     assert thinned(G, 8) is G
+    assert (thinned(G, 0)[:, :, 0] == np.diag(generator_box(G))).all()

@@ -24,7 +24,7 @@ class Chain:
         self.compiled = compiled
         first = Flow(
             compiled.fields, piece, compiled.w_centre, compiled.w_radius, order,
-            names=compiled.loop.names, reset=compiled.own_reset, stops=compiled.stops,
+            names=compiled.loop.names, reset=compiled.own_reset, stops=compiled.stops, lean=True,
         )  # fmt: skip
         self.flows = [first]
         self.failure = "" if first.failure is None else str(first.failure)

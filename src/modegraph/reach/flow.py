@@ -73,6 +73,7 @@ class Flow:
     generation : how often the starts were enclosed again.
     longest_step : seconds; switching instants are ends of steps, so steps must not be too long.
     t0, energy : seconds and a bound of int u'u at the start, for a flow that continues another.
+    lean : only boxes are kept of the remainders behind the last step.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class Flow:
         framed: bool = False,
         longest_step: float = np.inf,
         generation: int = 0,
+        lean: bool = False,
     ) -> None:
         self.fields = list(fields)
         self.piece = piece
@@ -110,6 +112,7 @@ class Flow:
         self.first_segment = self.segment
         self.longest_step = longest_step
         self.generation = generation
+        self.lean = lean
         self.stops = sorted(s for s in stops if s > t0)
         self.steps: list[Step] = []
         self.h = 0.0
@@ -332,7 +335,7 @@ class Flow:
         )
         if len(self.steps) > 1:
             # Only the last remainder goes on; of the others the targets need no more than this.
-            self.steps[-2].G = thinned(self.steps[-2].G, 1 + self.piece.variables)
+            self.steps[-2].G = thinned(self.steps[-2].G, 0 if self.lean else 1 + self.piece.variables)
         self._p, self._G, self._ebox, self.time = p, G, tube, t1
         if t1 >= fld.end:
             self.segment += 1

@@ -36,9 +36,11 @@ def generator_box(G: Floats) -> Floats:
 
 def thinned(G: Floats, kept: int) -> Floats:
     """Generators that hold the same sets with the first ``kept`` coefficients only; boxes for the others."""
+    n = G.shape[1]
+    if kept == 0:
+        return np.diag(generator_box(G))[:, :, None]
     if G.shape[2] <= 2 * kept:
         return G
-    n = G.shape[1]
     out = np.zeros((len(G) + n, n, kept))
     out[: len(G)] = G[:, :, :kept]
     out[len(G) + np.arange(n), np.arange(n), 0] = generator_box(G[:, :, kept:])

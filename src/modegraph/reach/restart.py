@@ -64,6 +64,7 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
         energy=max(spent),
         longest_step=first.longest_step,
         generation=first.generation + 1,
+        lean=first.lean,
     )
 
 
