@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from ..expression.ops import (
@@ -108,7 +109,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
     elif op == STEP:
         if j == 0 and kinks[q, 0] != 0.0:
             c[0] = kinks[q, 0]
-            d = 0
+            d = np.int64(0)
     elif op == MUL:
         for i in range(j + 1):
             da = dg[a, i]
@@ -128,7 +129,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
         if j == 0:
             da = min(dg[a, 0], dmax)
             c[0] = 1.0 / P[a, 0, 0]
-            d = 0
+            d = np.int64(0)
             right = 1
             while right < dmax + 1 and da > 0:
                 right *= 2
@@ -142,7 +143,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
                 d = min(dmax, d + dn)
         else:
             w1[:] = 0.0
-            dt = -1
+            dt = np.int64(-1)
             for i in range(1, j + 1):
                 da = dg[a, i]
                 db = dg[q, j - i]

@@ -37,8 +37,9 @@ def observe_step(
         ranges[r, 1] = np.nan
     for _attempt in range(2):
         solve_in_time(
-            ops, const, kinks, ranges, outputs, variables, 0, Q, dq, h, KQ, cut, product, offset, start, degree
-        )
+            ops, const, kinks, ranges, outputs, variables, np.int64(0), Q, dq, h, KQ,
+            cut, product, offset, start, degree,
+        )  # fmt: skip
         coefficient_norms(Q, dq, nQ, start)
         remainders(ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree)
         if not wants_another_try(ops, kinks, ranges):
@@ -99,11 +100,12 @@ def enclose_at(
         ranges[r, 1] = np.nan
     for _attempt in range(2):
         solve_in_time(
-            ops, const, kinks, ranges, outputs, variables, 0, Q, dq, 1.0, 0, cut, product, offset, start, degree
-        )
+            ops, const, kinks, ranges, outputs, variables, np.int64(0), Q, dq, 1.0, np.int64(0),
+            cut, product, offset, start, degree,
+        )  # fmt: skip
         coefficient_norms(Q, dq, nQ, start)
         bad = remainders(
-            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, 0, cut, pairs, product, offset, start, degree
+            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, np.int64(0), cut, pairs, product, offset, start, degree
         )
         if not wants_another_try(ops, kinks, ranges):
             break

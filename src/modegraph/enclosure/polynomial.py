@@ -6,6 +6,7 @@ it (-1: zero) and cuts the loops.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy"}
@@ -50,7 +51,7 @@ def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
         return 0
     c[:] = 0.0
     c[0] = series[dmax]
-    dc = 0
+    dc = np.int64(0)
     for k in range(dmax - 1, -1, -1):
         for i in range(start[dmax + 1]):
             work[i] = 0.0

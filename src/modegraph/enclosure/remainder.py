@@ -54,6 +54,8 @@ def coefficient_norms(P, dg, norms, start):
 def truncated_part(na, tb, ta, K, cut, in_time):
     """L1 norm of what a product drops: powers of time above K, degrees above cut.
 
+    (Callers pass constants as np.int64: a literal would be compiled as a version of its own.)
+
     na (K+1, n+1) norms of a by degree; ta, tb (K+1, n+2) tail sums of a and b. With ``in_time`` it is
     the product a' b integrated over the step: weight i / (i + j).
     """
@@ -184,21 +186,23 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             spread = const_rad[q] * ((A[a] + R[a]) if op == MULC else 1.0)
             R[q] = (f * (R[a] + r) + spread + 2.0 * UNIT * (f * A[a] + abs(const[q]))) * UP + TINY
         elif op == MUL:
-            lost = truncated_part(norms[a], tails[b], tails[a], K, cut, False)
+            lost = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0))
             R[q] = (A[a] * R[b] + R[a] * A[b] + R[a] * R[b] + lost + gamma * A[a] * A[b]) * UP + TINY
         elif op == SQR:
-            lost = truncated_part(norms[a], tails[a], tails[a], K, cut, False)
+            lost = truncated_part(norms[a], tails[a], tails[a], K, cut, np.int64(0))
             R[q] = (2.0 * A[a] * R[a] + R[a] * R[a] + lost + gamma * A[a] * A[a]) * UP + TINY
         elif op == SIN:
             # E = stored - true obeys E_s' = E_c a' + d1, E_c' = -E_s a' + d2: a rotation, so
             # |E|_2 <= |E(0)|_2 + int |d|_2 <= |E(0)|_2 + D1 + D2.
-            es = composition_error(SIN, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
-            ec = composition_error(COS, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
+            es = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
+            ec = composition_error(
+                np.int64(COS), P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
+            )
             speed = 0.0
             for j in range(1, K + 1):
                 speed += j * tails[a, j, 0]
-            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, True) + gamma * speed * A[b]
-            d2 = truncated_part(norms[a], tails[q], tails[a], K, cut, True) + gamma * speed * A[q]
+            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(1)) + gamma * speed * A[b]
+            d2 = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(1)) + gamma * speed * A[q]
             R[q] = (math.sqrt(es * es + ec * ec) + d1 + d2 + R[a]) * UP + TINY
             R[b] = R[q]
         elif op == COS:
@@ -209,8 +213,8 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             for j in range(1, K + 1):
                 speed += j * tails[a, j, 0]
                 travel += tails[a, j, 0]
-            e0 = composition_error(EXP, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
-            d1 = truncated_part(norms[a], tails[q], tails[a], K, cut, True) + gamma * speed * A[q]
+            e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
+            d1 = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(1)) + gamma * speed * A[q]
             # E' = E a' + d: |E(s)| <= (|E(0)| + D) exp(a(s) - a(tau)).
             stored = (e0 + d1) * math.exp(travel * UP) * UP
             top = P[a, 0, 0] + (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0)))
@@ -223,7 +227,7 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
                 travel += tails[a, j, 0]
                 speed += j * tails[a, j, 0]
             e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
-            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, True) + gamma * speed * A[b]
+            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(1)) + gamma * speed * A[b]
             # E' = (stored g - g) a' + d with g = 1/a or 1/(1 + a^2), whose remainder is R[b].
             lip = R[a] if op == ATAN else R[a] * (A[b] + R[b])
             R[q] = (e0 + d1 + R[b] * travel + lip) * UP + TINY
@@ -231,7 +235,7 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
                 R[q] = np.inf
         elif op == RECIP:
             # rho = |a r - 1| formed explicitly; r - 1/alpha = (a r - 1 + r (alpha - a)) / alpha.
-            rho = truncated_part(norms[a], tails[q], tails[a], K, cut, False) + gamma * A[a] * A[q]
+            rho = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[q]
             for j in range(K + 1):
                 work[:] = 0.0
                 for i in range(j + 1):

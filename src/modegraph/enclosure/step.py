@@ -235,7 +235,7 @@ def flow_step(
                 RQ[jvariables[first_w + j]] = radius[j]
         jranges[:] = np.nan
         solve_in_time(
-            jops, jconst, jkinks, jranges, joutputs, jvariables, 0, Q, dq, h, KJ, jcut, jproduct, joffset,
+            jops, jconst, jkinks, jranges, joutputs, jvariables, np.int64(0), Q, dq, h, KJ, jcut, jproduct, joffset,
             jstart, jdegree,
         )  # fmt: skip
         coefficient_norms(Q, dq, nQ, jstart)
