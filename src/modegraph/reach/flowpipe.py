@@ -55,6 +55,8 @@ class Flowpipe:
         When not complete: at what time, which state, why, and what would help.
     states : tuple[str, ...]
         Names of the coordinates of the boxes: states, then memory.
+    pieces, steps : int
+        Parts the start set was cut into, and validated steps of all of them.
     """
 
     def __init__(self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str) -> None:
@@ -68,11 +70,11 @@ class Flowpipe:
         until = min(chain.time for chain in chains)
         instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
         self.times: Floats = instants[instants <= until] if begun else np.zeros(0)
-        count = len(chains)
-        pieces = "1 piece" if count == 1 else f"{count} pieces"
-        steps = sum(chain.steps for chain in chains)
+        self.pieces = len(chains)
+        self.steps = sum(chain.steps for chain in chains)
+        pieces = "1 piece" if self.pieces == 1 else f"{self.pieces} pieces"
         if self.complete:
-            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {steps} steps)"
+            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {self.steps} steps)"
         else:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
             self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
