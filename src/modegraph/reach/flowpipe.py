@@ -285,7 +285,8 @@ class _Cutting:
                 break
             halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
             children = [self._best(half, ladder, worst.rung, worst.top) for half in halves]
-            if min(child.chain.time for child in children) <= PROGRESS * worst.chain.time:
+            ended = [child.chain.time for child in children if child.chain.failure]
+            if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
                 stuck = "; cutting it gets no further"
                 break
             parts = [part for part in parts if part is not worst] + children
@@ -309,7 +310,7 @@ class _Cutting:
 def _further(chain: Chain, other: Chain) -> bool:
     """Whether a chain of higher degree is worth its cost: it gets further, or is narrower at the end."""
     if chain.failure or other.failure:
-        return chain.time > PROGRESS * other.time
+        return not chain.failure or chain.time > PROGRESS * other.time
     return float(_remainder(chain)[0].max()) < float(_remainder(other)[0].max())
 
 
