@@ -8,18 +8,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import modegraph as mg
-
 ROOT = Path(__file__).parents[1]
+TIME_LIMIT = 60.0
+"""Seconds for one case, its sampled spread included."""
 
 BUILD = """
-import json, resource, runpy, sys, time
-import modegraph as mg
-model = runpy.run_path(sys.argv[1])
+import json, resource, runpy, sys, timemodel = runpy.run_path(sys.argv[1])
 begin = time.perf_counter()
 graph = mg.build(model["modes"], horizon=model["horizon"])
 seconds = time.perf_counter() - begin
@@ -58,29 +55,23 @@ def import_seconds() -> float:
     return min(float(run.stdout) for run in runs)
 
 
-@dataclass(frozen=True)
-class PipeFigure:
-    """Time and end width of one flowpipe."""
+def figures(name: str, limit: float = TIME_LIMIT) -> dict[str, Any]:
+    """What one case shows, in a new process that is ended after ``limit`` seconds; never an exception.
 
-    seconds: float
-    widths: tuple[float, ...]
-    steps: int
-    complete: bool
-    reason: str
-
-
-def flowpipe(mode: mg.Mode, until: float, states: tuple[str, ...]) -> PipeFigure:
-    """The faster of two runs (the first one may load kernels); widths of ``states`` at ``until``."""
-    best, pipe = float("inf"), None
-    for _ in range(2):
-        begin = time.perf_counter()
-        pipe = mg.flowpipe(mode, horizon=until)
-        best = min(best, time.perf_counter() - begin)
-    assert pipe is not None
-    if not pipe.complete:
-        return PipeFigure(best, tuple(float("nan") for _ in states), len(pipe.times), False, pipe.reason)
-    begin = time.perf_counter()
-    box = pipe.at(until)
-    best += time.perf_counter() - begin
-    index = [mode.system.states.index(name) for name in states]
-    return PipeFigure(best, tuple(float(box.hi[k] - box.lo[k]) for k in index), len(pipe.times), True, "")
+    Keys as `benchmarks.one` prints them; without "seconds" there is only a "reason".
+    """
+    command = [sys.executable, "-m", "benchmarks.one", name]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        try:
+            out, err = process.communicate(timeout=limit)
+            missing = err.strip().splitlines()[-1] if err.strip() else "nothing was printed"
+        except subprocess.TimeoutExpired:
+            process.kill()
+            out, _ = process.communicate()
+            missing = f"not done in {limit:g} s"
+    row: dict[str, Any] = {}
+    for line in out.splitlines():
+        row.update(json.loads(line))
+    if process.returncode:
+        row["reason"] = "; ".join(text for text in (row.get("reason"), missing) if text)
+    return row

@@ -245,3 +245,13 @@ def test_undefined_arguments_are_unbounded(op: int) -> None:
     start = np.zeros((2, K + 1, TABLE.size))
     start[0, 0, 0], start[0, 0, TABLE.linear[0]] = 1.0, 1.0
     assert np.isinf(stored(made, start, np.zeros(2))[1][-1])
+
+
+def test_a_large_factor_of_a_small_value_costs_only_relative_rounding() -> None:
+    """mu / r^3 of an orbit: the factor is 1e18, what it multiplies 1e-16."""
+    made = Program()
+    made.apply(ops.MULC, 0, 0, 0, 1e18)
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, 0, 0] = 1e-16
+    P, R, _ = stored(made, start, np.zeros(2))
+    assert R[-1] <= 1e-15 * abs(P[-1, 0, 0])

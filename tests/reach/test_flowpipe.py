@@ -269,8 +269,65 @@ def test_one_reference_of_several() -> None:
 def test_degrees_rise_only_where_they_are_cheap() -> None:
     ladder = orders(compile_mode(van_der_pol(), None, observed=False), 2)
     assert ladder[0].degree == 8
-    assert [o.degree for o in orders(compile_mode(van_der_pol(), None), 7)] == [3, 4]
+    assert [o.degree for o in orders(compile_mode(van_der_pol(), None), 7)] == [3, 4, 6]
     assert [o.degree for o in orders(compile_mode(follower(mg.setpoint([0.0])), None), 1)] == [1]
+
+
+def coupled(b: tuple[float, float]) -> mg.Mode:
+    """Two van der Pol oscillators that pull at each other with an unknown constant."""
+
+    def field(x: Any, d: Any) -> Any:
+        pull = d["b"] * (x[2] - x[0])
+        first, second = vdp_field(x[:2]), vdp_field(x[2:])
+        return np.array([first[0], first[1] + pull, second[0], second[1] - pull])
+
+    start = mg.Box([1.25, 2.35] * 2, [1.55, 2.45] * 2)
+    return field_mode(field, "x1 y1 x2 y2", start, unknowns={"b": b})
+
+
+def degrees_tried(monkeypatch: pytest.MonkeyPatch, mode: mg.Mode, horizon: float) -> tuple[Flowpipe, list[int]]:
+    seen: list[int] = []
+
+    class Recorded(module.Chain):
+        def __init__(self, *args: Any) -> None:
+            super().__init__(*args)
+            seen.append(self.order.degree)
+
+    monkeypatch.setattr(module, "Chain", Recorded)
+    return mg.flowpipe(mode, horizon=horizon), seen
+
+
+def test_a_cut_that_reaches_the_end_is_kept() -> None:
+    """The whole ends at t = 5.63: no part of it can get 5 % further than that within 5.75 s."""
+    pipe = mg.flowpipe(coupled((1.0, 3.0)), horizon=5.75)
+    assert pipe.complete, pipe.reason
+    assert pipe.pieces == 2
+    assert pipe.steps > 2
+
+
+def test_a_heavy_degree_is_for_what_is_complete_but_very_loose(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe, tried = degrees_tried(monkeypatch, coupled((1.0, 1.6)), 7.0)
+    assert pipe.complete
+    assert max(tried) == 6
+    pipe, tried = degrees_tried(monkeypatch, coupled((1.0, 1.8)), 7.0)
+    assert pipe.complete
+    assert max(tried) == 8
+
+
+def test_a_run_of_low_degree_is_given_up_where_it_is_very_loose(monkeypatch: pytest.MonkeyPatch) -> None:
+    ends: dict[int, float] = {}
+
+    class Recorded(module.Chain):
+        def run(self, *args: Any) -> bool:
+            done = super().run(*args)
+            ends[self.order.degree] = self.time
+            return done
+
+    monkeypatch.setattr(module, "Chain", Recorded)
+    pipe = mg.flowpipe(coupled((0.95, 1.05)), horizon=7.0)
+    assert pipe.complete
+    assert ends[4] < 7.0
+    assert ends[6] == 7.0
 
 
 def test_cutting_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

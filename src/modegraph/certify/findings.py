@@ -36,6 +36,8 @@ def better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool)
     """Whether a part of the starts got further than the whole did."""
     if any(j in part.proofs or j in part.waiting for j in wanted) or (safety and part.safety is not None):
         return True
+    if (whole.failure or whole.unproved) and not (part.failure or part.unproved):
+        return True
     closer = any(part.missed[j].gauge < 0.9 * whole.missed[j].gauge for j in wanted if j in part.missed)
     return closer or part.safe_until > 1.1 * whole.safe_until
 

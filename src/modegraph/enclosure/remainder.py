@@ -184,7 +184,9 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             for j in range(K + 1):
                 r += tails[a, j, min(cut[j] + 1, n + 1)]
             spread = const_rad[q] * ((A[a] + R[a]) if op == MULC else 1.0)
-            R[q] = (f * (R[a] + r) + spread + 2.0 * UNIT * (f * A[a] + abs(const[q]))) * UP + TINY
+            # One rounding a coefficient: of c a, or of a + c.
+            rounded = f * A[a] if op == MULC else A[a] + abs(const[q])
+            R[q] = (f * (R[a] + r) + spread + 2.0 * UNIT * rounded) * UP + TINY
         elif op == MUL:
             lost = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0))
             R[q] = (A[a] * R[b] + R[a] * A[b] + R[a] * R[b] + lost + gamma * A[a] * A[b]) * UP + TINY

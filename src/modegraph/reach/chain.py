@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,9 +31,11 @@ class Chain:
         """Why it stopped; empty while it has not."""
         self.begun = first.failure is None
 
-    def run(self, end: float) -> bool:
-        """Advance until ``end``; False when the flowpipe failed before."""
+    def run(self, end: float, give_up: Callable[[Chain], bool] | None = None) -> bool:
+        """Advance until ``end``, or until ``give_up``; False when the flowpipe failed before."""
         while self.flows[-1].time < end:
+            if give_up is not None and give_up(self):
+                return True
             flow = self.flows[-1]
             if not flow.advance(end):
                 self.failure = str(flow.failure)

@@ -283,8 +283,8 @@ class Flow:
         back = RUNAWAY_STEPS
         if len(self._sizes) <= back or size == 0.0:
             return False
-        length = self.steps[-1].end - self.steps[-1].start
-        return size > 2.0 * self._sizes[-back - 1] and length < 0.15 * self._longest and self.feedback > 0.5
+        mean = (self.steps[-1].end - self.steps[-back].start) / back
+        return size > 2.0 * self._sizes[-back - 1] and mean < 0.15 * self._longest and self.feedback > 0.5
 
     def _attempt(self, fld: Field, h: float) -> Any:
         f, j = fld.rates, fld.jacobian

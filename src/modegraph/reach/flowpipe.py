@@ -6,11 +6,13 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..cores import in_parallel, one_core
 from ..errors import ModegraphError
 from ..model.mode import Mode
 from ..model.sets import Box, Set
@@ -23,15 +25,19 @@ from .start import Piece
 
 Floats = NDArray[np.float64]
 
-LADDER = ((3, 2), (4, 3), (6, 3), (8, 4), (10, 4))
+LADDER = ((3, 1), (4, 3), (6, 3), (8, 4), (10, 4))
 """Degrees of p and of the Jacobian flow; higher ones are tried where lower ones are loose or break down."""
 LIGHT_MONOMIALS, MOST_LIGHT = 130, 8
 """The first degree tried is the highest with at most so many monomials, up to this: they cost nothing."""
 MOST_MONOMIALS, MOST_GENERATOR_MONOMIALS = 500, 100
+MOST_HEAVY_MONOMIALS = 2000
+"""A degree with more than the first number is tried only where one below is complete but very loose."""
 MOST_DISTURBED = 6
 """Highest degree with a disturbance: there the remainder is what the disturbance adds."""
 LOOSE = 5e-3
 """Share of the remainder in the width of the last set above which a higher degree is tried."""
+VERY_LOOSE = 0.25
+"""The same share, above which a run of low degree is given up for the next one."""
 MOST_PIECES = 32
 DEEPEST_CUT = 7
 PROGRESS = 1.05
@@ -55,6 +61,8 @@ class Flowpipe:
         When not complete: at what time, which state, why, and what would help.
     states : tuple[str, ...]
         Names of the coordinates of the boxes: states, then memory.
+    pieces, steps : int
+        Parts the start set was cut into, and validated steps of all of them.
     """
 
     def __init__(self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str) -> None:
@@ -68,11 +76,11 @@ class Flowpipe:
         until = min(chain.time for chain in chains)
         instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
         self.times: Floats = instants[instants <= until] if begun else np.zeros(0)
-        count = len(chains)
-        pieces = "1 piece" if count == 1 else f"{count} pieces"
-        steps = sum(chain.steps for chain in chains)
+        self.pieces = len(chains)
+        self.steps = sum(chain.steps for chain in chains)
+        pieces = "1 piece" if self.pieces == 1 else f"{self.pieces} pieces"
         if self.complete:
-            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {steps} steps)"
+            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {self.steps} steps)"
         else:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
             self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
@@ -231,6 +239,10 @@ def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
     return end
 
 
+def monomial_count(variables: int, degree: int) -> int:
+    return math.comb(variables + degree, degree)
+
+
 def orders(compiled: CompiledMode, variables: int) -> list[Order]:
     """Degrees to try for a piece with so many variables, lowest first. Linear loops need degree 1."""
     if compiled.linear or variables == 0:
@@ -239,8 +251,8 @@ def orders(compiled: CompiledMode, variables: int) -> list[Order]:
     for degree, jacobian in LADDER:
         if found and degree > MOST_DISTURBED and compiled.w_radius.any():
             break
-        count = math.comb(variables + degree, degree)
-        if found and count > MOST_MONOMIALS:
+        count = monomial_count(variables, degree)
+        if found and count > MOST_HEAVY_MONOMIALS:
             break
         while jacobian > 1 and math.comb(variables + jacobian, jacobian) > MOST_GENERATOR_MONOMIALS:
             jacobian -= 1
@@ -273,28 +285,44 @@ class _Cutting:
         """A chain for each piece, and why cutting ended where it failed."""
         whole = self.compiled.whole()
         ladder = orders(self.compiled, whole.variables)
-        parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
-        stuck = ""
-        while not stuck and any(part.chain.failure for part in parts):
-            worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-            piece = worst.chain.piece
-            if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
-                stuck = "; no more are tried"
-                break
-            halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
-            children = [self._best(half, ladder, worst.rung, worst.top) for half in halves]
-            if min(child.chain.time for child in children) <= PROGRESS * worst.chain.time:
-                stuck = "; cutting it gets no further"
-                break
-            parts = [part for part in parts if part is not worst] + children
+        with one_core():
+            parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
+            stuck = ""
+            while not stuck and any(part.chain.failure for part in parts):
+                worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
+                piece = worst.chain.piece
+                if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+                    stuck = "; no more are tried"
+                    break
+                halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
+                children = list(
+                    in_parallel([partial(self._best, half, ladder, worst.rung, worst.top) for half in halves])
+                )
+                ended = [child.chain.time for child in children if child.chain.failure]
+                if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
+                    stuck = "; cutting it gets no further"
+                    break
+                parts = [part for part in parts if part is not worst] + children
         return [part.chain for part in parts], stuck
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""
+        light = [monomial_count(piece.variables, order.degree) <= MOST_MONOMIALS for order in ladder]
         best: _Part | None = None
+        given_up: _Part | None = None
         for rung in range(first, top + 1):
+            if best is not None and not light[rung] and (best.chain.failure or not _very_loose(best.chain)):
+                break
             chain = Chain(self.compiled, self.framed, piece, ladder[rung])
-            done = chain.run(self.end)
+            impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
+            done = chain.run(self.end, _very_loose if impatient else None)
+            if done and chain.time < self.end:
+                given_up = _Part(chain, rung, top)
+                continue
+            if given_up is not None and not done:
+                given_up.chain.run(self.end)
+                best = given_up
+            given_up = None
             if best is not None and not _further(chain, best.chain):
                 return replace(best, top=best.rung)
             best = _Part(chain, rung, top)
@@ -307,7 +335,7 @@ class _Cutting:
 def _further(chain: Chain, other: Chain) -> bool:
     """Whether a chain of higher degree is worth its cost: it gets further, or is narrower at the end."""
     if chain.failure or other.failure:
-        return chain.time > PROGRESS * other.time
+        return not chain.failure or chain.time > PROGRESS * other.time
     return float(_remainder(chain)[0].max()) < float(_remainder(other)[0].max())
 
 
@@ -318,8 +346,11 @@ def _remainder(chain: Chain) -> tuple[Floats, Floats]:
     return generator_box(G), np.abs(p[:, 1:]).sum(axis=1)
 
 
-def _loose(chain: Chain) -> bool:
+def _loose(chain: Chain, share: float = LOOSE) -> bool:
     """Whether the remainder counts in the width of the last set, beyond what time steps leave."""
     z, own = _remainder(chain)
     size = float(np.abs(chain.flows[-1].set_at(0)[0]).sum(axis=1).max())
-    return bool((z > LOOSE * own + 1e-6 * size).any())
+    return bool((z > share * own + 1e-6 * size).any())
+
+
+_very_loose = partial(_loose, share=VERY_LOOSE)
