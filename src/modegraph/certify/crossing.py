@@ -164,8 +164,12 @@ def _cross(
         return Missed(missed.gauge, missed.time, False, worst)
     crossings: list[Crossing] = []
     variable = widest_variable(bounds, p[best])
+    children = piece.split(variable)
+    if not children:
+        # No start is left in this cell: everything is true of it.
+        return [Crossing(0, float(reach.times[0]), -np.inf, -np.inf, np.inf, 0.0)]
     table = reach.flow.table
-    for child in piece.split(variable):
+    for child in children:
         restriction = Restriction(piece, child, table, p.shape[2])
         q, error = restriction.apply(p)
         cells = PolynomialBounds(child, table, p.shape[2])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.sets import Sublevel
 from ..reach.start import Piece
 
 Floats = NDArray[np.float64]
@@ -25,18 +24,10 @@ def sample_variables(piece: Piece) -> Floats:
         xi = xi / np.maximum(length, 1.0)[:, None]
         eta[:, :f] = np.clip((xi - piece.middle[:f]) / np.maximum(piece.radius[:f], 1e-300), -1.0, 1.0)
     if piece.chart.sublevel is not None:
-        _move_inside(piece, piece.chart.sublevel, eta)
+        found = piece.points[:SAMPLES]
+        eta[:, : piece.chart.free] = 0.0
+        eta[: len(found), : piece.chart.free] = found
     return eta
-
-
-def _move_inside(piece: Piece, start: Sublevel, eta: Floats) -> None:
-    """Replace samples by points of the set, where any are found; by the middle of the piece else."""
-    chart, f = piece.chart, piece.chart.free
-    axis = chart.axes.argmax(axis=0)
-    points = start.draw_within(len(eta), np.random.default_rng(7), *chart.box(piece.lo[:f], piece.hi[:f]))
-    xi = (points[:, axis] - chart.centre[axis]) / chart.axes.sum(axis=0)
-    eta[:, :f] = 0.0
-    eta[: len(xi), :f] = np.clip((xi - piece.middle[:f]) / np.maximum(piece.radius[:f], 1e-300), -1.0, 1.0)
 
 
 def sample_powers(piece: Piece, exponents: NDArray[np.int64]) -> Floats:

@@ -27,6 +27,8 @@ from .field import cover
 
 Floats = NDArray[np.float64]
 
+POINTS = 48
+"""Points of a Sublevel that are looked for in a piece."""
 UNDERFLOW = 2.0**-1000
 """More than any sum of products can lose below the normal range."""
 
@@ -95,6 +97,17 @@ class Piece:
     @cached_property
     def radius(self) -> Floats:
         return cover(self.lo, self.hi)[1]
+
+    @cached_property
+    def points(self) -> Floats:
+        """Some starts (k, m) of a Sublevel in this piece, scaled to [-1, 1] (floats); k = 0: none was found."""
+        chart = self.chart
+        assert chart.sublevel is not None
+        m, axis = chart.free, chart.axes.argmax(axis=0)
+        box = chart.box(self.lo[:m], self.hi[:m])
+        xi = chart.sublevel.draw_within(POINTS, np.random.default_rng(7), *box)[:, axis] - chart.centre[axis]
+        eta = (xi / chart.axes.sum(axis=0) - self.middle[:m]) / np.maximum(self.radius[:m], 1e-300)
+        return np.asarray(np.clip(eta, -1.0, 1.0))
 
     def polynomials(self, linear: NDArray[np.int64], size: int) -> tuple[Floats, Floats, Floats]:
         """States (n, size), unknowns (nd, size) over the monomial table, and a rounding box (n,).

@@ -102,7 +102,7 @@ def ellipsoids(function: LevelFunction) -> tuple[Ellipsoid, Ellipsoid] | None:
     A centre that is off by at most epsilon in the norm of the set makes it smaller or larger by that;
     that the rounded shapes make up for it is checked exactly.
     """
-    if len(function.parts) != 1:
+    if len(function.parts) != 1 or function.graph.dropped:
         return None
     bound = function.parts[0].bound(function.level)
     polynomial = None if bound is None else quadratic(function, function.parts[0].expr.index)
