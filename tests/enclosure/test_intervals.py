@@ -20,6 +20,7 @@ FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "waves": lambda x, y: np.sin(3 * x) * np.cos(x - 2 * y),
     "growth": lambda x, y: np.exp(x - y) + np.log(4 + x) + np.arctan(5 * y),
     "kinks": lambda x, y: np.maximum(x, y) - np.minimum(2 * x, y) + abs(x - y),
+    "shifted kinks": lambda x, y: np.maximum(x + 1, y * y - 2) * np.minimum(x * x - 3, y + 1) + abs(x - y + 1),
     "choice": lambda x, y: np.where(x > y, x * y, y - x),
 }
 
@@ -72,6 +73,8 @@ def test_rational_arithmetic_is_rounded_outward() -> None:
         (lambda x, y: abs(x) * (1 + np.maximum(y, 0)), 10.0),
         (lambda x, y: x * x - np.sin(y), 99.0),
         (lambda x, y: -np.minimum(-x, y), 10.0),
+        (lambda x, y: np.maximum(x * x - 100, np.sin(y) + 3) - 1, 1.0),
+        (lambda x, y: -np.minimum(-x - 2, y * y + 1) + 3, 15.0),
     ],
 )
 def test_unbounded_boxes(fn: Callable[[Any, Any], Any], least: float) -> None:

@@ -80,11 +80,16 @@ class IntervalEvaluator:
 
     def _operation(self, k: int, op: int, a: Range, b: Range, c: int, rows: list[Range]) -> Range:
         if k in self._extremes:
-            kind, i, j = self._extremes[k]
+            kind, i, j, shifted = self._extremes[k]
             if kind == "abs":
                 return _magnitude(rows[i])
+            first, other = rows[i], rows[j]
+            if shifted >= 0:
+                low, high = _constant(self.tape, shifted, 1)
+                low, high = (low, high) if kind == "max" else (-high, -low)
+                first = _outward(first[0] + low, first[1] + high)
             pick = np.maximum if kind == "max" else np.minimum
-            return pick(rows[i][0], rows[j][0]), pick(rows[i][1], rows[j][1])
+            return pick(first[0], other[0]), pick(first[1], other[1])
         if op == ADD:
             return _outward(a[0] + b[0], a[1] + b[1])
         if op == SUB:
@@ -115,26 +120,37 @@ class IntervalEvaluator:
         return _monotone(op, *a)
 
 
-def _extremes(tape: Tape) -> dict[int, tuple[str, int, int]]:
-    """Rows that are |a| = 2 relu(a) - a, max(a, b) = b + relu(a - b) or min(a, b) = a - relu(a - b).
+def _extremes(tape: Tape) -> dict[int, tuple[str, int, int, int]]:
+    """Rows that are |a| = 2 relu(a) - a, max(a + d, b) = b + relu(a - b + d) or min(b - d, a) = a - relu(a - b + d).
 
-    Term by term their ranges would be far too wide, and unbounded on unbounded boxes.
+    Term by term their ranges would be far too wide, and unbounded on unbounded boxes. Returns the kind,
+    the rows of both arguments, the first of which the constant d of the last row is added to (min:
+    subtracted from); -1 for no constant.
     """
-    found: dict[int, tuple[str, int, int]] = {}
+    found: dict[int, tuple[str, int, int, int]] = {}
     ops = tape.ops.tolist()
+
+    def gap(relu: int) -> tuple[int, int, int]:
+        """Rows p, q and that of d where row ``relu`` is relu(p - q + d); else -2."""
+        row = ops[relu][1] if ops[relu][0] == RELU else relu
+        shifted = row if ops[row][0] == ADDC else -1
+        row = ops[row][1] if shifted >= 0 else row
+        known = ops[relu][0] == RELU and ops[row][0] == SUB
+        return (ops[row][1], ops[row][2], shifted) if known else (-2, -2, -1)
+
     for k, (op, a, b, _) in enumerate(ops):
         if op == SUB and ops[a][0] == MULC and tape.const[a] == 2.0 and tape.const_rad[a] == 0.0:
             if ops[ops[a][1]][:2] == [RELU, b]:
-                found[k] = "abs", b, b
-        elif op == SUB and ops[b][0] == RELU:
-            gap = ops[ops[b][1]]
-            if gap[0] == SUB and gap[1] == a:
-                found[k] = "min", a, gap[2]
+                found[k] = "abs", b, b, -1
+        elif op == SUB:
+            p, q, shifted = gap(b)
+            if p == a:
+                found[k] = "min", q, a, shifted
         elif op == ADD:
             for relu, other in ((a, b), (b, a)):
-                gap = ops[ops[relu][1]] if ops[relu][0] == RELU else [VAR]
-                if gap[0] == SUB and gap[2] == other:
-                    found[k] = "max", gap[1], other
+                p, q, shifted = gap(relu)
+                if q == other:
+                    found[k] = "max", p, other, shifted
     return found
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modegraph.errors import ModegraphError
+from modegraph.expression.ops import ADDC
 from modegraph.model.sets import exact
 from modegraph.model.sets.base import Floats
 
@@ -67,9 +68,8 @@ class LevelFunction:
 
     def _arguments(self, index: int, offset: Fraction) -> list[tuple[int, Fraction]]:
         """The arguments of an outer maximum, with what is added to them outside of it."""
-        from modegraph.expression.ops import ADDC
-
         graph = self.graph
+        index, offset = self._named(index, offset)
         kind, operands = graph.origins.get(index, ("", ()))
         if kind == "max":
             return [found for k in operands for found in self._arguments(k, offset)]
@@ -80,6 +80,21 @@ class LevelFunction:
         if node.op == ADDC and node.const is not None:
             return self._arguments(node.a, offset + node.const)
         return [(index, offset)]
+
+    def _named(self, index: int, offset: Fraction) -> tuple[int, Fraction]:
+        """The maximum or absolute value that differs from a node by a constant, which folding has merged."""
+        graph = self.graph
+
+        def base(k: int) -> tuple[int, Fraction]:
+            node = graph.nodes[k]
+            return (k, Fraction(0)) if node.const is None or node.op != ADDC else (node.a, node.const)
+
+        inner, shift = base(index)
+        for k, (kind, _) in graph.origins.items():
+            other, merged = base(k)
+            if other == inner and kind in ("max", "abs"):
+                return k, offset + shift - merged
+        return index, offset
 
     def _part(self, index: int, offset: Fraction) -> Part:
         from modegraph.expression.graph import NONNEGATIVE
