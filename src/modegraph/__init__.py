@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
 
 if TYPE_CHECKING:
+    from modegraph.certify.largest_start import largest_start
     from modegraph.certify.references import References
     from modegraph.certify.verdict import Status, Verdict, Witness
     from modegraph.graph.build import build
@@ -94,6 +95,7 @@ _HOME = {
     "Zonotope": "model.sets.zonotope",
     "build": "graph.build",
     "flowpipe": "reach.flowpipe",
+    "largest_start": "certify.largest_start",
     "minimum_energy": "model.signals",
     "minimum_time": "model.signals",
     "quintic": "model.signals",
@@ -106,11 +108,6 @@ _HOME = {
 def load(path: Any) -> NoReturn:
     """Read a saved graph; not built yet."""
     raise NotBuiltYet("load: saving and loading graphs is not built yet; build the graph from its modes")
-
-
-def largest_start(mode: Any, shape: Any, r: Any = None) -> NoReturn:
-    """Find a start set; not built yet."""
-    raise NotBuiltYet("largest_start is not built yet; give the mode a start set and check it with build")
 
 
 def __getattr__(name: str) -> Any:

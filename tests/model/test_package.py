@@ -29,7 +29,7 @@ def test_import_is_fast_and_light():
 def test_names_are_listed_and_found():
     assert {"System", "build", "Unreachable", "largest_start"} <= set(dir(mg))
     assert set(mg.__all__) <= set(dir(mg))
-    assert set(mg._HOME) | {"ModegraphError", "NotBuiltYet", "Unreachable", "load", "largest_start"} == set(mg.__all__)
+    assert set(mg._HOME) | {"ModegraphError", "NotBuiltYet", "Unreachable", "load"} == set(mg.__all__)
     assert mg.Status.CERTIFIED.value == "certified"
     assert mg.Box is mg.Box
 
@@ -40,7 +40,7 @@ def test_every_name_has_a_home(name):
 
 
 def test_what_is_not_built_says_so():
-    for ask in (lambda: mg.load("file"), lambda: mg.largest_start(None, None), lambda: mg.Supervisor):
+    for ask in (lambda: mg.load("file"), lambda: mg.Supervisor):
         with pytest.raises(NotBuiltYet, match="not built yet"):
             ask()
 

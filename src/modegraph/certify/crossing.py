@@ -14,10 +14,10 @@ from ..reach.cells import Restriction
 from ..reach.flow import Flow, generator_box
 from ..reach.start import Piece
 from .region import Region
+from .samples import powers_at, sample_variables
 
 Floats = NDArray[np.float64]
 
-SAMPLES = 48
 DEEPEST_CELL = 7
 """A piece is cut into at most 2**DEEPEST_CELL cells, each with its own switching time."""
 
@@ -151,9 +151,7 @@ def _cross(
     lost: Floats,
     depth: int,
 ) -> list[Crossing] | Missed:
-    gauges = region.gauges(bounds, p, generators)
-    if lost.any():
-        gauges = np.nextafter(gauges + region.box_gauges(lost), np.inf)
+    gauges = region.swollen_gauges(bounds, p, generators, lost)
     inside = np.flatnonzero(gauges <= 1.0)
     if len(inside):
         return [_crossing(reach, region, bounds, p, gauges, int(inside[0]))]
@@ -166,8 +164,12 @@ def _cross(
         return Missed(missed.gauge, missed.time, False, worst)
     crossings: list[Crossing] = []
     variable = widest_variable(bounds, p[best])
+    children = piece.split(variable)
+    if not children:
+        # No start is left in this cell: everything is true of it.
+        return [Crossing(0, float(reach.times[0]), -np.inf, -np.inf, np.inf, 0.0)]
     table = reach.flow.table
-    for child in piece.split(variable):
+    for child in children:
         restriction = Restriction(piece, child, table, p.shape[2])
         q, error = restriction.apply(p)
         cells = PolynomialBounds(child, table, p.shape[2])
@@ -186,12 +188,10 @@ def _crossing(
     end = len(p) - 1
     # How far reset(x) strays between instants is not bounded.
     if reach.reset is None and instant < end and gauges[min(instant + 1, end)] <= 1.0:
-        plain = region.gauges(bounds, p[instant:], [np.zeros((0, p.shape[1], 1))] * (end + 1 - instant))
         size = p.shape[1]
         steps = flow.steps[instant:end]
         out = np.stack([flow.swell(s)[:size] if len(s.tube) >= size else np.full(size, np.inf) for s in steps])
-        tube = np.maximum(plain[:-1], plain[1:]) + region.box_gauges(out)
-        for step, gauge in zip(steps, tube, strict=True):
+        for step, gauge in zip(steps, region.tube_gauges(bounds, p[instant:], out), strict=True):
             if not gauge <= 1.0:
                 break
             window += step.end - step.start
@@ -211,41 +211,13 @@ def _sampled(
     Under a disturbance the remainder counts, for smaller parts do not make it smaller.
     """
     eta = sample_variables(piece)
-    powers = _powers(eta, reach.flow.table.exponents[: p.shape[2]])
+    powers = powers_at(eta, reach.flow.table.exponents[: p.shape[2]])
     points = np.einsum("kin,sn->ksi", p, powers)
     z = np.stack([generator_box(G) for G in generators]) if len(generators) else np.zeros(p.shape[:2])
-    gauges = region.point_gauges(points)
-    if reach.flow.w_radius.any():
-        gauges = gauges + region.box_gauges(z)[:, None]
+    gauges = region.point_gauges(points, z if reach.flow.w_radius.any() else None)
     each = gauges.min(axis=0)
     worst = int(np.argmax(each))
     return bool((each < 1.0).all()), eta[worst]
-
-
-def sample_variables(piece: Piece) -> Floats:
-    """Some starts of a piece, (SAMPLES, m) in its scaled variables; half of them extreme."""
-    rng = np.random.default_rng(7)
-    eta = rng.uniform(-1.0, 1.0, (SAMPLES, piece.variables))
-    eta[: SAMPLES // 2] = np.sign(eta[: SAMPLES // 2])
-    if piece.chart.round:
-        f = piece.chart.free
-        xi = piece.middle[:f] + piece.radius[:f] * eta[:, :f]
-        length = np.sqrt((xi**2).sum(axis=1))
-        xi = xi / np.maximum(length, 1.0)[:, None]
-        eta[:, :f] = np.clip((xi - piece.middle[:f]) / np.maximum(piece.radius[:f], 1e-300), -1.0, 1.0)
-    return eta
-
-
-def sample_powers(piece: Piece, exponents: NDArray[np.int64]) -> Floats:
-    """Values (SAMPLES, N) of all monomials at the sampled starts."""
-    return _powers(sample_variables(piece), exponents)
-
-
-def _powers(eta: Floats, exponents: NDArray[np.int64]) -> Floats:
-    powers = np.ones((len(eta), len(exponents)))
-    for v in range(eta.shape[1]):
-        powers *= eta[:, [v]] ** exponents[:, v]
-    return powers
 
 
 def widest_variable(bounds: PolynomialBounds, p: Floats) -> int:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..expression.evaluate import Evaluator
 from ..reach.flow import Flow
 from ..reach.framing import generator_box
-from .crossing import sample_powers
 from .proof import least_slack
+from .samples import sample_powers
 from .verdict import Widths
 
 Floats = NDArray[np.float64]

@@ -205,7 +205,7 @@ class Exploration:
         children: list[Findings] = []
         for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
             children.append(part)
-            if not better(part, found, again, check_again):
+            if piece.chart.sublevel is None and not better(part, found, again, check_again):
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
                 return found
         return merge(found, children, again, check_again)

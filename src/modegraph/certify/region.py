@@ -1,4 +1,4 @@
-"""A target set as inequalities that reach sets are tested against.
+"""A convex target set as inequalities that reach sets are tested against.
 
 A set with faces {x : a'x <= b} is tested face by face; a ball or ellipsoid through y = T (x - c),
 |y|_2 <= 1. Gauges are 1 on the boundary and computed upward: gauge <= 1 is a proof of containment.
@@ -122,12 +122,30 @@ class Region:
         y = radius @ np.abs(self.T).T
         return np.asarray(np.sqrt((y**2).sum(axis=1)) * self.grow * (1.0 + 8.0 * (self.dim + 4) * UNIT))
 
-    def point_gauges(self, x: Floats) -> Floats:
-        """Float gauges (...) of points (..., n): a proposal, not a bound."""
+    def swollen_gauges(
+        self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats], radius: Floats
+    ) -> Floats:
+        """As `gauges`, of the sets with boxes of radii (K, n) added to them."""
+        gauges = self.gauges(bounds, p, generators)
+        return np.nextafter(gauges + self.box_gauges(radius), np.inf) if radius.any() else gauges
+
+    def tube_gauges(self, bounds: PolynomialBounds, p: Floats, out: Floats) -> Floats:
+        """Upper bounds (K - 1,) of the gauge on the way from each of K sets to the next.
+
+        For each xi the way is within a box of radii out (K - 1, n) of the chord from p_k(xi) to
+        p_k+1(xi), which a convex target contains with its ends.
+        """
+        plain = self.gauges(bounds, p, [np.zeros((0, p.shape[1], 1))] * len(p))
+        return np.asarray(np.maximum(plain[:-1], plain[1:]) + self.box_gauges(out))
+
+    def point_gauges(self, x: Floats, radius: Floats | None = None) -> Floats:
+        """Float gauges (K, S) of points (K, S, n), or of boxes of radii (K, n) there: a proposal, not a bound."""
         if self._faces is not None:
             slack = self.b - x @ self.A.T
-            return np.asarray((1.0 - slack / self.distance).max(axis=-1))
-        return np.asarray(np.sqrt((((x - self.centre) @ self.T.T) ** 2).sum(axis=-1)))
+            gauges = (1.0 - slack / self.distance).max(axis=-1)
+        else:
+            gauges = np.sqrt((((x - self.centre) @ self.T.T) ** 2).sum(axis=-1))
+        return np.asarray(gauges if radius is None else gauges + self.box_gauges(radius)[:, None])
 
     # -- separation ------------------------------------------------------------------------------
 

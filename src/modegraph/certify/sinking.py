@@ -12,9 +12,10 @@ from ..reach.decay import SettledLoop
 from ..reach.flow import Flow
 from ..reach.funnel import Funnel, FunnelBuilder, NoFunnel, Sublevel
 from ..reach.tail import Tail
-from .crossing import Missed, sample_powers
+from .crossing import Missed
 from .proof import least_slack
 from .region import Region
+from .samples import sample_powers
 
 BISECTIONS = 10
 """Halvings of the radius at which a target is reached."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from .evidence import slack_until, width_over_time
 from .exploration import Exploration, Findings, Goal
 from .proof import SwitchProof, certified_check, certified_switch
 from .region import Region
+from .sublevel_region import target_region
 from .verdict import Floats, Status, Verdict, Witness
 
 POINT_STEPS = 3000
@@ -64,6 +65,29 @@ def certify_unit(
     return _Unit(mode, p, compiled, targets, horizon, deadline, progress or (lambda text: None)).run()
 
 
+def exploration_of(
+    compiled: CompiledMode,
+    goals: Mapping[int, Goal],
+    horizon: float | None,
+    deadline: float,
+    tick: Callable[[str], None],
+) -> Exploration:
+    """The exploration of a compiled mode."""
+    return Exploration(
+        compiled.fields,
+        compiled.framed_fields(),
+        goals,
+        plant=compiled.plant,
+        w=(compiled.w_centre, compiled.w_radius),
+        names=compiled.loop.names,
+        reset=compiled.own_reset,
+        horizon=horizon,
+        stops=compiled.stops,
+        deadline=deadline,
+        tick=tick,
+    )
+
+
 class _Unit:
     def __init__(
         self,
@@ -100,30 +124,19 @@ class _Unit:
 
     def _goal(self, spec: TargetSpec) -> Goal:
         if isinstance(spec.mode, Target):
-            return Goal(Region(spec.mode.set), None)
+            spec.mode.settle(self.compiled.plant)
+            return Goal(target_region(spec.mode.set), None)
         target = mode_start(spec.mode, spec.p)
         reset = None
         if target.dim > self.compiled.plant:
             reset = compile_reset(close_loop(spec.mode, spec.p))
-        return Goal(Region(target), reset)
+        return Goal(target_region(target), reset)
 
     # -- proofs ----------------------------------------------------------------------------------
 
     def _prove(self) -> None:
         compiled = self.compiled
-        exploration = Exploration(
-            compiled.fields,
-            compiled.framed_fields(),
-            dict(self.goals),
-            plant=compiled.plant,
-            w=(compiled.w_centre, compiled.w_radius),
-            names=compiled.loop.names,
-            reset=compiled.own_reset,
-            horizon=self.horizon,
-            stops=compiled.stops,
-            deadline=self.deadline,
-            tick=self.tick,
-        )
+        exploration = exploration_of(compiled, dict(self.goals), self.horizon, self.deadline, self.tick)
         self._switches_in_zero_time()
         scene = self._scene()
         self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])

@@ -34,7 +34,10 @@ def validate_modes(modes: Iterable[Mode | Target]) -> tuple[Mode | Target, ...]:
     _require_unique_names(listed)
     _require_same_states(real)
     for target in listed:
-        if isinstance(target, Target) and target.set.dim != real[0].system.n:
+        if not isinstance(target, Target):
+            continue
+        target.settle(real[0].system.n)
+        if target.set.dim != real[0].system.n:
             raise ModegraphError(
                 f"target {target.name!r}: its set has {target.set.dim} coordinates but the plant has "
                 f"{real[0].system.n} states ({', '.join(real[0].system.states)}); give one for each state"

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +43,7 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
         return None
     centre, axes = enclosed
     first = flows[0]
-    chart = replace(first.piece.chart, centre=centre, axes=axes, round=False, faces=None, original=False)
+    chart = first.piece.chart.around(centre, axes, original=False)
     m = first.piece.chart.free
     free = axes.shape[1]
     variables = free + len(first.piece.uncertain)

@@ -1,7 +1,8 @@
 """Start sets as polynomials: every start is c + L xi for one xi in the domain of a piece.
 
 A piece is a box of xi (and of the unknown constants), cut with the unit ball for Ball and Ellipsoid
-starts and with the faces for Polytopes. Pieces are what splitting makes.
+starts, with the faces for Polytopes, and to what may be inside for Sublevels. Pieces are what
+splitting makes.
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ from ..model.sets.base import Set
 from ..model.sets.box import Box
 from ..model.sets.ellipsoid import Ellipsoid
 from ..model.sets.polytope import Polytope
+from ..model.sets.sublevel import Sublevel
 from ..model.sets.zonotope import Zonotope
 from .field import cover
 
 Floats = NDArray[np.float64]
 
+POINTS = 48
+"""Points of a Sublevel that are looked for in a piece."""
 UNDERFLOW = 2.0**-1000
 """More than any sum of products can lose below the normal range."""
 
@@ -44,11 +48,25 @@ class Chart:
     unknown_hi: Floats
     original: bool = True
     """The starts themselves, not a later reach set."""
+    sublevel: Sublevel | None = None
+    """Only points of this set count; the axes are then parallel to the coordinates."""
 
     @property
     def free(self) -> int:
         """Number m of variables of the start itself."""
         return self.axes.shape[1]
+
+    def around(self, centre: Floats, axes: Floats, original: bool) -> Chart:
+        """A chart of the parallelotope centre + axes [-1, 1]^k, with the same unknowns."""
+        return Chart(centre, axes, False, None, self.unknown_lo, self.unknown_hi, original)
+
+    def box(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
+        """A box of states that holds c + L xi for lo <= xi <= hi, for axes parallel to the coordinates."""
+        weight = self.axes.sum(axis=1)
+        place = np.abs(self.axes) > 0.0
+        low, high = (np.where(place, side, 0.0).sum(axis=1) for side in (lo, hi))
+        slack = np.where(place.any(axis=1), 4.0 * UNIT * (np.abs(self.centre) + weight), 0.0)
+        return self.centre + weight * low - slack, self.centre + weight * high + slack
 
 
 @dataclass(frozen=True)
@@ -79,6 +97,17 @@ class Piece:
     @cached_property
     def radius(self) -> Floats:
         return cover(self.lo, self.hi)[1]
+
+    @cached_property
+    def points(self) -> Floats:
+        """Some starts (k, m) of a Sublevel in this piece, scaled to [-1, 1] (floats); k = 0: none was found."""
+        chart = self.chart
+        assert chart.sublevel is not None
+        m, axis = chart.free, chart.axes.argmax(axis=0)
+        box = chart.box(self.lo[:m], self.hi[:m])
+        xi = chart.sublevel.draw_within(POINTS, np.random.default_rng(7), *box)[:, axis] - chart.centre[axis]
+        eta = (xi / chart.axes.sum(axis=0) - self.middle[:m]) / np.maximum(self.radius[:m], 1e-300)
+        return np.asarray(np.clip(eta, -1.0, 1.0))
 
     def polynomials(self, linear: NDArray[np.int64], size: int) -> tuple[Floats, Floats, Floats]:
         """States (n, size), unknowns (nd, size) over the monomial table, and a rounding box (n,).
@@ -158,9 +187,27 @@ class Piece:
                             hi[v] = min(hi[v], rest)
                         else:
                             lo[v] = max(lo[v], rest)
+        if self.chart.sublevel is not None and not self._cut_to(self.chart.sublevel, lo, hi):
+            return None
         if (lo > hi).any():
             return None
         return replace(self, lo=lo, hi=hi)
+
+    def _cut_to(self, start: Sublevel, lo: Floats, hi: Floats) -> bool:
+        """Shrink lo, hi (in place) around what may lie in the set; False if that is nothing."""
+        chart = self.chart
+        below, above = chart.box(lo[: chart.free], hi[: chart.free])
+        hull = start.hull_within(below, above)
+        if hull is None:
+            return False
+        for v, k in enumerate(chart.axes.argmax(axis=0).tolist()):
+            centre, radius = chart.centre[k], chart.axes[k, v]
+            slack = 8.0 * UNIT * (abs(centre) + radius) / radius
+            if hull[0][k] > below[k]:
+                lo[v] = max(lo[v], (hull[0][k] - centre) / radius - slack)
+            if hull[1][k] < above[k]:
+                hi[v] = min(hi[v], (hull[1][k] - centre) / radius + slack)
+        return True
 
     def linear_bound(self, coefficients: Floats) -> Floats:
         """sup over the piece of sum_v coefficients[..., v] eta_v, eta the scaled variables; rounded up.
@@ -185,10 +232,16 @@ class Piece:
 
 def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
     """The piece that covers a bounded start set and all unknown constants."""
+    cut: Sublevel | None = None
+    if isinstance(start, Sublevel):
+        if start.ellipsoids is None:
+            cut = start
+        else:
+            start = start.ellipsoids[1]
     centre, axes, ball, faces = _chart(start)
     lo = np.array([u[0] for u in unknowns], float)
     hi = np.array([u[1] for u in unknowns], float)
-    chart = Chart(centre, axes, ball, faces, lo, hi)
+    chart = Chart(centre, axes, ball, faces, lo, hi, sublevel=cut)
     m = axes.shape[1] + int((lo < hi).sum())
     piece = Piece(chart, -np.ones(m), np.ones(m)).tightened()
     if piece is None:
@@ -225,9 +278,10 @@ def _chart(start: Set) -> tuple[Floats, Floats, bool, tuple[Floats, Floats] | No
         bound = b - A @ centre
         # Relative rounding, and an absolute allowance for products below the normal range.
         faces = scaled, bound + 8.0 * (len(lo) + 4) * UNIT * (size + np.abs(b)) + UNDERFLOW
-    elif not isinstance(start, Box):
+    elif not isinstance(start, (Box, Sublevel)):
         raise ModegraphError(
-            f"a {type(start).__name__} cannot be a start set yet; use a Box, Ball, Ellipsoid, Zonotope or Polytope"
+            f"a {type(start).__name__} cannot be a start set; use a Box, Ball, Ellipsoid, Zonotope, Polytope or "
+            "Sublevel"
         )
     return centre, axes, False, faces
 

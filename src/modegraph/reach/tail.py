@@ -173,7 +173,7 @@ class TailSearch:
         inside = [self._inside(flow, axes, centre) for flow in flows]
         if not all(inside):
             return TailFailure("the reach set is not inside the candidate set")
-        chart = replace(self.chart, centre=centre, axes=axes, round=False, faces=None)
+        chart = self.chart.around(centre, axes, self.chart.original)
         d = int((chart.unknown_lo < chart.unknown_hi).sum())
         piece = Piece(chart, -np.ones(k + d), np.ones(k + d))
         last = replace(self.fld, start=0.0)

@@ -21,7 +21,7 @@ Face = tuple[exact.Row, Fraction]
 
 
 class Set(ABC):
-    """A closed convex set of states, inputs or disturbances; its doubles are exact numbers.
+    """A closed set of states, inputs or disturbances, convex unless it is a Sublevel; its doubles are exact numbers.
 
     Sets are immutable: their arrays are read-only copies of what was given.
     """
@@ -58,12 +58,15 @@ class Set(ABC):
     def _outline(self, dims: tuple[int, int]) -> Floats:
         """Corners, (k, 2) in order, of the projection onto two coordinates, for drawing."""
 
+    def settle(self, *dims: int) -> None:  # noqa: B027
+        """Take the first of these dimensions that fits, if the set does not know its own (only a Sublevel may not)."""
+
     def is_empty(self) -> bool:
-        """Whether the set has no point at all (only a Polytope can be empty)."""
+        """Whether the set has no point at all (only a Polytope or a Sublevel can be empty)."""
         return False
 
     def is_bounded(self) -> bool:
-        """Whether the set is bounded (only a Polytope can be unbounded)."""
+        """Whether the set is bounded (only a Polytope or a Sublevel can be unbounded)."""
         return True
 
     def faces(self) -> list[Face] | None:

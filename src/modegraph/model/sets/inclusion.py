@@ -13,6 +13,7 @@ from modegraph.model.sets.ball import Ball
 from modegraph.model.sets.base import Floats, Set
 from modegraph.model.sets.box import Box
 from modegraph.model.sets.ellipsoid import Ellipsoid
+from modegraph.model.sets.sublevel import Sublevel
 from modegraph.model.sets.zonotope import Zonotope
 
 _FEW_CORNERS = 64
@@ -20,7 +21,7 @@ _FEW_CORNERS = 64
 
 
 def is_subset(inner: Set, outer: Set) -> bool:
-    """Whether every point of ``inner`` lies in ``outer``, proved in rational arithmetic.
+    """Whether every point of ``inner`` lies in ``outer``, proved in rational (Sublevel: interval) arithmetic.
 
     True is a proof. False means "not proved": it is exact too when ``outer`` is a Box or a Polytope,
     for a Box or Ball in a Ball, and mostly where ``inner`` has few corners. An empty set is inside
@@ -38,8 +39,12 @@ def is_subset(inner: Set, outer: Set) -> bool:
         )
     if inner == outer or inner.is_empty():
         return True
-    if not inner.is_bounded() and outer.is_bounded():
+    if isinstance(inner, Sublevel) and isinstance(outer, Sublevel) and inner.is_lower_level_of(outer):
+        return True
+    if not inner.is_bounded() and (outer.is_bounded() or isinstance(outer, Sublevel)):
         return False
+    if isinstance(outer, Sublevel):
+        return outer.holds_box(*inner.bounding_box())
     if isinstance(outer, Ball) and outer.radius == 0:
         outer = Box(outer.c, outer.c)
     faces = outer.faces()
