@@ -67,7 +67,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             c[0] = const[q]
             dg[q, 0] = 0
         return
-    d = -1
+    d = np.int64(-1)
     if op >= RECIP and op <= ATAN and kinks[q, 0] == PLAIN:
         dg[q, j] = -1
         if j == 0 and kinks[q, 1] != 0.0:
