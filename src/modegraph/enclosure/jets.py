@@ -67,7 +67,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             c[0] = const[q]
             dg[q, 0] = 0
         return
-    d = np.int64(-1)
+    d = -1
     if op >= RECIP and op <= ATAN and kinks[q, 0] == PLAIN:
         dg[q, j] = -1
         if j == 0 and kinks[q, 1] != 0.0:
@@ -109,7 +109,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
     elif op == STEP:
         if j == 0 and kinks[q, 0] != 0.0:
             c[0] = kinks[q, 0]
-            d = np.int64(0)
+            d = 0
     elif op == MUL:
         for i in range(j + 1):
             da = dg[a, i]
@@ -129,7 +129,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
         if j == 0:
             da = min(dg[a, 0], dmax)
             c[0] = 1.0 / P[a, 0, 0]
-            d = np.int64(0)
+            d = 0
             right = 1
             while right < dmax + 1 and da > 0:
                 right *= 2
