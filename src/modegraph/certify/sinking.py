@@ -16,11 +16,13 @@ from .crossing import Missed
 from .proof import least_slack
 from .region import Region
 from .samples import sample_powers
+from .verdict import Floats
 
 BISECTIONS = 10
 """Halvings of the radius at which a target is reached."""
-ROOM = 1.03
+ROOM = 1.05
 """How much wider than the sampled set the mouth of a funnel is asked to be."""
+TRIES = 3
 
 
 @dataclass(frozen=True)
@@ -145,13 +147,25 @@ class Funnels:
         points += np.sign(rng.uniform(-1.0, 1.0, (len(points), len(G)))) @ G[:, :, 0]
         middle = points.mean(axis=0)
         fit = np.maximum(np.abs(points - middle).max(axis=0), 1e-12)
-        found = self.builder.build(
-            middle + ROOM * (points - middle), fit, lambda s: all(gauge_of(s, region) <= 1.0 for region in regions)
-        )
+        room = ROOM
+        for _ in range(TRIES):
+            mouth = middle + room * (points - middle)
+            found = self.builder.build(mouth, fit, lambda s: True)
+            if isinstance(found, NoFunnel):
+                return found
+            if found.enter(flow.bounds, p, G) is not None:
+                return self._whole(flow, mouth, fit, regions)
+            # Samples seldom reach the corners of what the remainder fills.
+            room *= ROOM * found.gauge(flow.bounds, p, G)
+        return NoFunnel("the reach set is not inside the ellipsoid that shrinks")
+
+    def _whole(self, flow: Flow, mouth: Floats, fit: Floats, regions: Sequence[Region]) -> Sinking | NoFunnel:
+        """The funnel with this mouth, followed until everything is in the regions."""
+        found = self.builder.build(mouth, fit, lambda s: all(gauge_of(s, region) <= 1.0 for region in regions))
         if isinstance(found, NoFunnel):
             return found
-        self.known.append(found)
-        hit = found.enter(flow.bounds, p, G)
+        hit = found.enter(flow.bounds, *flow.state_set(len(flow.steps)))
         if hit is None:
             return NoFunnel("the reach set is not inside the ellipsoid that shrinks")
+        self.known.append(found)
         return Sinking(found, *hit, flow.time)

@@ -157,6 +157,11 @@ class Funnel:
                 found = k, gauge
         return found
 
+    def gauge(self, bounds: PolynomialBounds, p: Floats, G: Floats) -> float:
+        """How much larger than the mouth a set is."""
+        first = self.rungs[0]
+        return float(first.norm.quadric.gauges(bounds, p[None], [G])[0]) / first.radius
+
     @property
     def end(self) -> Sublevel:
         """Where everything is in the end."""
