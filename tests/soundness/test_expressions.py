@@ -152,7 +152,7 @@ def test_quick(tree: Tree, ends: list[float]) -> None:
 
 
 @pytest.mark.campaign
-@setting(6000)
+@setting(20000)
 @given(TREES, BOXES)
 def test_campaign(tree: Tree, ends: list[float]) -> None:
     check(tree, ends)
