@@ -61,9 +61,17 @@ class Copy:
         plugins = ("-p", "no:cacheprovider", "-p", "tests.mutants.unshrunk")
         return self.python(cache, "-m", "pytest", "-x", "-q", *plugins, "-m", "not campaign", *tests)
 
-    def imports_itself(self) -> bool:
+    def is_sound(self, tests: Sequence[str]) -> bool:
+        """Whether Python imports this copy, and the tests pass on it as long as it has no fault."""
         found = self.python(self.cache, "-c", "import modegraph; print(modegraph.__file__)").stdout.strip()
-        return Path(found).resolve() == (self.root / SOURCE / "__init__.py").resolve()
+        if Path(found).resolve() != (self.root / SOURCE / "__init__.py").resolve():
+            print(f"not the copy is imported, but {found}")
+            return False
+        run = self.test(self.cache, tests) if tests else None
+        if run is not None and run.returncode != 0:
+            print("the tests fail without any fault:", run.stdout[-2000:], run.stderr[-400:])
+            return False
+        return True
 
     def judge(self, fault: Fault) -> Result:
         begin = time.monotonic()
@@ -103,33 +111,28 @@ def main() -> int:
     chosen = [f for f in FAULTS if not options.names or any(name in f.name for name in options.names)]
     if not chosen:
         parser.error("no fault has such a name")
-    with tempfile.TemporaryDirectory(prefix="modegraph-mutants-") as folder:
-        copies: SimpleQueue[Copy] = SimpleQueue()
-        for k in range(options.jobs):
-            copies.put(Copy(Path(folder) / str(k)))
-        first = copies.get()
-        if not first.imports_itself():
-            print("the copy is not what Python imports")
+    with tempfile.TemporaryDirectory(prefix="modegraph-mutants-") as folder, ThreadPoolExecutor(options.jobs) as pool:
+        copies = [Copy(Path(folder) / str(k)) for k in range(options.jobs)]
+        tests = sorted({test for fault in chosen for test in fault.tests})
+        shares = [tests[k :: options.jobs] for k in range(options.jobs)]
+        if not all(pool.map(Copy.is_sound, copies, shares)):
             return 1
-        sound = first.test(first.cache, sorted({test for fault in chosen for test in fault.tests}))
-        copies.put(first)
-        if sound.returncode != 0:
-            print("the tests fail without any fault:", sound.stdout[-2000:], sound.stderr[-400:])
-            return 1
+        free: SimpleQueue[Copy] = SimpleQueue()
+        for copy in copies:
+            free.put(copy)
 
         def judge(fault: Fault) -> Result:
-            copy = copies.get()
+            copy = free.get()
             try:
                 result = copy.judge(fault)
             finally:
-                copies.put(copy)
+                free.put(copy)
             print(f"{'caught' if result.caught else 'FAILED':8s} {result.seconds:5.0f} s  {fault.name}", flush=True)
             if result.note:
                 print(f"         {result.note}", flush=True)
             return result
 
-        with ThreadPoolExecutor(options.jobs) as pool:
-            results = list(pool.map(judge, chosen))
+        results = list(pool.map(judge, chosen))
     left = [result.fault.name for result in results if not result.caught]
     print(f"{len(results)} faults, {len(results) - len(left)} caught" + (f"; left: {', '.join(left)}" if left else ""))
     return 1 if left else 0

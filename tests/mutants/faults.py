@@ -54,10 +54,10 @@ FAULTS = (
         (NODES + "test_random_expressions",),
     ),
     Fault(
-        "a relu is bounded at the ends of its argument only",
+        "a relu across its kink is believed to be its chord",
         "enclosure/remainder.py",
-        "                    gap = max(gap, abs(beta))",
-        "                    gap = gap + 0.0",
+        "R[q] = (gap + abs(alpha) * (R[a] + r)",
+        "R[q] = (abs(alpha) * (R[a] + r)",
         (OPERATIONS,),
     ),
     Fault(
@@ -304,5 +304,33 @@ FAULTS = (
         "        if not (step.face_upper <= 0.0).all():",
         "        if not (step.face_upper[:-1] <= 0.0).all():",
         ("tests/certify/test_crossing.py",),
+    ),
+    Fault(
+        "the slope of the cosine has the wrong sign",
+        "expression/derivative.py",
+        "return graph.neg(graph.mul(graph.sin(a), da))",
+        "return graph.mul(graph.sin(a), da)",
+        ("tests/expression/test_derivative.py",),
+    ),
+    Fault(
+        "the energy of the whole is that of its best part",
+        "certify/proof.py",
+        "energy=max(p.energy for p in parts)",
+        "energy=min(p.energy for p in parts)",
+        ("tests/certify/test_proof.py",),
+    ),
+    Fault(
+        "an invariant set starts when its first part does",
+        "certify/proof.py",
+        "tail_start=max(p.tail_start for p in parts)",
+        "tail_start=min(p.tail_start for p in parts)",
+        ("tests/certify/test_proof.py",),
+    ),
+    Fault(
+        "a parallelotope forgets that its inverse is rounded",
+        "reach/parallelotope.py",
+        "    return np.asarray((reach + 2.0 * off * reach.max(initial=0.0)) * (1.0 + 4.0 * UNIT))",
+        "    return np.asarray(reach - reach * 1e-9)",
+        ("tests/reach/test_parallelotope.py",),
     ),
 )
