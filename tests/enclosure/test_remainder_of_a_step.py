@@ -19,11 +19,13 @@ RATES: dict[str, tuple[Any, int]] = {
     "minus cube": (lambda x: [-3.0 * x[0] ** 3], 1),
     "exponential": (lambda x: [np.exp(0.8 * x[0]) - 2.0], 1),
     "fast decay": (lambda x: [-12.0 * x[0] + np.sin(x[0])], 1),
+    # The remainder meets the kink on the way, but not at the start: one look at the tube is not enough.
+    "late kink": (lambda x: [4.0 * (x[0] - 1.0) + 30.0 * np.maximum(x[0] - 2.4, 0.0)], 1),
     "pendulum": (lambda x: [x[1], -9.0 * np.sin(x[0]) - 0.2 * x[1]], 2),
     "product": (lambda x: [x[0] * x[1], 1.0 - x[0] ** 2 + 0.5 * x[1]], 2),
     "saturated": (lambda x: [x[1], -4.0 * np.clip(x[0] + x[1], -0.6, 0.6)], 2),
 }
-LENGTHS = (0.02, 0.1, 0.3, 0.6)
+LENGTHS = (0.005, 0.02, 0.1, 0.3, 0.6)
 
 
 def new_flow(dynamics: Any, start: mg.Box, order: Order, push: mg.Box | None = None) -> Flow:
