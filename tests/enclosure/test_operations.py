@@ -131,8 +131,8 @@ def test_the_defect_of_the_fundamental_matrix(KP: int, q: int, uncertain: float)
     size = int(TABLE.start[q + 1])
     rng = np.random.default_rng(KP)
     s = (np.arange(400) + 0.5) / 400
-    for _ in range(6):
-        J = rng.normal(size=(n * n, KJ + 1, size))
+    for scale in (1.0, 1.0, 1.0, 0.2, 0.2, 0.01):
+        J = rng.normal(size=(n * n, KJ + 1, size)) * scale
         dJ = np.full((n * n, KJ + 1), q)
         norms = np.stack([np.abs(J[:, :, TABLE.degree[:size] == d]).sum(axis=2) for d in range(q + 1)], axis=2)
         end, sup, last, bend, tails = fundamental_matrix(J, dJ, n, h, KJ, KP, q, *TABLE.arrays)
