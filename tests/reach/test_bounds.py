@@ -43,3 +43,19 @@ def test_no_sample_is_outside_the_range(start: Any, scale: float) -> None:
             assert ((powers @ p >= lo - slack) & (powers @ p <= hi + slack)).all()
             higher = powers[:, table.degree > 1] @ p[table.degree > 1]
             assert ((higher >= below - slack) & (higher <= above + slack)).all()
+
+
+def test_a_linear_form_on_parts_of_a_ball() -> None:
+    table = monomials((1, 1), 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, 721)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) * (1.0 - 1e-15)
+    parts = whole(mg.Ball([0.0, 0.0], 1.0), []).split(0)
+    parts += [child for part in parts for child in part.split(1)]
+    for piece in parts:
+        inside = circle[((piece.lo <= circle) & (circle <= piece.hi)).all(axis=1)]
+        eta = (inside - piece.middle) / piece.radius
+        bounds = PolynomialBounds(piece, table, table.size)
+        for d in circle[::15]:
+            p = np.zeros(table.size)
+            p[table.linear] = d * piece.radius
+            assert (eta @ (d * piece.radius)).max() <= float(bounds.upper(p)) + 1e-14
