@@ -2,12 +2,13 @@
 #   make demo        prove and plan the two-link arm (core dependencies only)
 #   make test        lint, types, tests            make soundness   the long campaign
 #   make bench       speed and width beside the published figures
+#   make mutants     plant faults in the proof engine and see that the tests catch each
 PYTHON ?= $(shell command -v python3.11 || command -v python3 || command -v python)
 BIN := .venv/bin
 PYTEST := $(BIN)/python -m pytest
 export MPLBACKEND := Agg
 
-.PHONY: demo test lint bench soundness clean
+.PHONY: demo test lint bench soundness mutants clean
 .DEFAULT_GOAL := test
 
 .venv/bin/python:
@@ -35,6 +36,9 @@ test: lint
 
 soundness: .venv/.develop
 	$(PYTEST) -n 2 --dist worksteal -m campaign tests/soundness
+
+mutants: .venv/.develop
+	$(BIN)/python -m tests.mutants
 
 bench: .venv/.core
 	$(BIN)/python -m benchmarks

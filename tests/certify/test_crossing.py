@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 import modegraph as mg
 from modegraph.certify.crossing import Missed, Reach, find_crossings, proved_instants
@@ -62,6 +63,25 @@ def test_nothing_is_inside_before_the_constraints_are_proved() -> None:
     assert proved_instants(flow) == -1
     assert isinstance(find_crossings(Reach(flow, None), Region(mg.Box([-9.0], [9.0]))), Missed)
     assert proved_instants(decaying(limit=2.05)) > 10
+
+
+@pytest.mark.parametrize("name", ["first", "second"])
+def test_a_constraint_that_is_broken_on_the_way(name: str) -> None:
+    """x = x0 + t: one of two constraints ends at x = 1, the target begins at 1.5."""
+    mode = mg.Mode(
+        "m",
+        PLANT,
+        controller=lambda x: 1.0 + 0.0 * x[0],
+        reference=mg.setpoint([0.0]),
+        start=mg.Box([0.0], [0.1]),
+        constraints=lambda x: {key: x[0] <= (1.0 if key == name else 9.0) for key in ("first", "second")},
+    )
+    c = compile_mode(mode, None)
+    flow = Flow(c.fields, c.whole(), c.w_centre, c.w_radius, Order(1, 0), names=c.loop.names, longest_step=0.05)
+    assert flow.run(2.5)
+    assert 0.8 < flow.times[proved_instants(flow)] <= 0.9
+    assert isinstance(find_crossings(Reach(flow, None), Region(mg.Box([1.5], [2.5]))), Missed)
+    assert not isinstance(find_crossings(Reach(flow, None), Region(mg.Box([0.4], [0.8]))), Missed)
 
 
 def test_the_stay_in_a_target_on_its_own_memory() -> None:

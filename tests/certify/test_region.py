@@ -72,6 +72,39 @@ def test_the_boundary(scale: float) -> None:
     assert gauge(ball, mg.Box([edge, 0.0], [edge, 0.0])) > 1.0
 
 
+@pytest.mark.parametrize("kind", sets(1.0))
+def test_a_remainder_counts(kind: str) -> None:
+    """A point with generators is inside where all its corners are."""
+    target = sets(1.0)[kind]
+    region, piece, table = Region(target), whole(mg.Box([0, 0], [1, 1]), []), monomials((1, 1), 1)
+    bounds = PolynomialBounds(piece, table, table.size)
+    rng = np.random.default_rng(4)
+    proved = 0
+    for _ in range(300):
+        p = np.zeros((1, 2, table.size))
+        p[0, :, 0] = np.array([1.0, -2.0]) + rng.uniform(-0.3, 0.3, 2)
+        G = rng.normal(size=(3, 2, 1)) * float(rng.choice([0.01, 0.1, 0.3]))
+        if region.gauges(bounds, p, [G])[0] <= 1.0:
+            corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T @ G[:, :, 0]
+            assert all(target.contains(p[0, :, 0] + corner * (1 - 1e-12)) for corner in corners)
+            proved += 1
+    assert proved >= 5
+
+
+def test_points_on_a_face_are_never_separated() -> None:
+    rng = np.random.default_rng(5)
+    touched = 0
+    for _ in range(400):
+        A = rng.normal(size=(3, 3))
+        inner = rng.normal(size=3)
+        target = mg.Polytope(np.vstack([A, -A]), np.concatenate([A @ inner, 5.0 + np.abs(A).sum(axis=1) * 9.0]))
+        x = inner * (1.0 + rng.integers(-4, 5, 3) * 2.0**-53)
+        if target.contains(x):
+            assert not Region(target).separated(x[None], x[None])[0]
+            touched += 1
+    assert touched >= 20
+
+
 def test_flat_targets_hold_themselves_at_most() -> None:
     region = Region(mg.Box([1.0, 0.0], [1.0, 2.0]))
     assert gauge(region, mg.Box([1.0 + 2**-52, 1.0], [1.0 + 2**-52, 1.0])) > 1.0

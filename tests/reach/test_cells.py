@@ -39,3 +39,21 @@ def test_a_restricted_polynomial_is_the_same_function(start: mg.Box, scale: floa
                         assert sum(Fraction(float(c)) * x for c, x in zip(row, powers, strict=True)) <= Fraction(
                             float(bound)
                         )
+
+
+@pytest.mark.parametrize("scale", [1e-150, 1.0, 1e150])
+def test_rounding_of_a_restriction_is_counted(scale: float) -> None:
+    """At the middle of the part the substitution is nothing but rounding."""
+    parent = whole(mg.Box([0, 0], [1, 1]), [])
+    table = monomials((1, 1), 4)
+    child = parent.split(0)[1].split(1)[0].split(0)[0]
+    restriction = Restriction(parent, child, table, table.size)
+    middle = [Fraction(float(v)) for v in child.middle]
+    rng = np.random.default_rng(1)
+    for p in rng.normal(size=(40, table.size)) * scale:
+        q, error = restriction.apply(p)
+        true = sum(
+            Fraction(float(c)) * middle[0] ** int(e[0]) * middle[1] ** int(e[1])
+            for c, e in zip(p, table.exponents, strict=True)
+        )
+        assert abs(true - Fraction(float(q[0]))) <= Fraction(float(error))

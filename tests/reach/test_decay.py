@@ -98,3 +98,10 @@ def test_no_proof_against_a_sample(seed: int) -> None:
         worst = max(worst, float(np.linalg.eigvalsh(K + K.T).max()))
     assert not region.negative(-(worst - 1e-9) * np.eye(3))
     assert region.negative(-(worst + 0.1 * abs(worst) + 0.2) * np.eye(3))
+
+
+@pytest.mark.parametrize("c, holds", [(0.03, True), (0.06, False)])
+def test_what_a_polynomial_misses_counts(c: float, holds: bool) -> None:
+    # The Jacobian -1 + c exp(3 x) changes sign in |x| <= 1 from c = .0498 on; its cubic, from c = .077 on.
+    loop = settled(lambda x: np.array([-x[0] + c / 3.0 * (np.exp(3.0 * x[0]) - 1.0)]), 1)
+    assert DecayRegion(loop, round_norm(1), 1.0).negative(np.zeros((1, 1))) is holds

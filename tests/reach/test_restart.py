@@ -68,6 +68,21 @@ def test_a_restart_holds_the_end(compiled: CompiledMode, framed: bool) -> None:
     assert float(following.seen_bounds.upper(step.energy)) + step.energy_radius >= spent
 
 
+def test_a_restart_holds_what_is_bent() -> None:
+    """The end is a banana: far wider in its nonlinear part than in its remainder."""
+    plant = mg.System(
+        lambda x, u, w: np.array([-x[0] + 0.001 * w[0], 2.0 * x[0] ** 2 - x[1]]),
+        states=2, inputs=1, disturbance=mg.Box([-1], [1]),
+    )  # fmt: skip
+    start = mg.Box([-1.0, -0.01], [1.0, 0.01])
+    mode = mg.Mode("m", plant, controller=lambda x: 0.0 * x[0], reference=mg.setpoint([0.0]), start=start)
+    c = compile_mode(mode, None)
+    flow = flow_of(c, c.whole(), 12)
+    following = restarted([flow], c.fields)
+    assert following is not None
+    holds(following, points(flow))
+
+
 def test_a_common_restart_holds_all_ends(compiled: CompiledMode) -> None:
     flows = [flow_of(compiled, piece, 10 + 2 * k) for k, piece in enumerate(compiled.whole().split(0))]
     following = restarted(flows, compiled.fields)

@@ -10,7 +10,8 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.unit import compile_mode
-from modegraph.reach.tail import relevant_states
+from modegraph.reach.flow import Flow, Order
+from modegraph.reach.tail import Tail, TailSearch, relevant_states
 
 
 def mode(dynamics: Callable[..., Any], start: mg.Box, controller: Callable[..., Any] | None = None) -> mg.Mode:
@@ -40,8 +41,10 @@ CLOCK = mg.Box([0.5, 0.0, -10.0], [1.0, 0.1, -9.9])
         lambda x: np.log(-x[2]),
         lambda x: np.sqrt(-x[2]),
         lambda x: x[0] * x[2] / x[2],
+        lambda x: 0.0 * (1.0 / x[2]),
+        lambda x: 1.0 / x[2] - 1.0 / x[2],
     ],
-    ids=["reciprocal", "logarithm", "square root", "cancelled"],
+    ids=["reciprocal", "logarithm", "square root", "cancelled", "times zero", "difference"],
 )
 def test_a_state_that_feeds_nothing_may_still_leave_a_domain(rate: Callable[[Any], Any]) -> None:
     source = mode(lambda x, u: np.array([u[0] - x[0], rate(x), 1.0]), CLOCK)
@@ -83,3 +86,14 @@ def test_a_drifting_state_that_is_defined_everywhere_is_no_obstacle(rate: Callab
 def test_only_states_that_matter_are_relevant() -> None:
     source = mode(lambda x, u: np.array([u[0] - x[0], x[0], 1.0]), CLOCK)
     assert relevant_states(compile_mode(source, None).fields[-1]) == [0]
+
+
+@pytest.mark.parametrize("size, good", [(0.5, True), (0.9, True), (1.03, False), (1.2, False)])
+def test_a_set_that_leaves_is_no_invariant_set(size: float, good: bool) -> None:
+    """x' = x^3 - x settles from |x| < 1 only, and starts just outside are slow to leave."""
+    c = compile_mode(mode(lambda x, u: np.array([x[0] ** 3 - x[0] + u[0]]), mg.Box([-size], [size])), None)
+    order = Order(4, 3)
+    flow = Flow(c.fields, c.whole(), c.w_centre, c.w_radius, order, names=c.loop.names)
+    assert flow.advance(0.01)
+    search = TailSearch(c.fields[-1], flow.piece.chart, c.w_centre, c.w_radius, c.loop.names, order)
+    assert isinstance(search.attempt([flow]), Tail) is good
