@@ -16,7 +16,10 @@ TIME_LIMIT = 60.0
 """Seconds for one case, its sampled spread included."""
 
 BUILD = """
-import json, resource, runpy, sys, timemodel = runpy.run_path(sys.argv[1])
+import json, resource, runpy, sys, time
+import modegraph as mg
+
+model = runpy.run_path(sys.argv[1])
 begin = time.perf_counter()
 graph = mg.build(model["modes"], horizon=model["horizon"])
 seconds = time.perf_counter() - begin

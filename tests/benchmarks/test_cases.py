@@ -106,3 +106,10 @@ def test_a_missed_goal_is_marked() -> None:
     seen = {"complete": True, "seconds": 0.2, "widths": [1.1], "spread": [1.0], "holds": False}
     assert table.missed(Figures(seconds=0.1, ratio=1.05), seen) == ["seconds", "width", "property"]
     assert table.missed(Figures(seconds=0.3, ratio=1.2), {**seen, "holds": True}) == []
+
+
+def test_a_build_is_measured_in_a_process_of_its_own() -> None:
+    run = measure.build("point_mass")
+    assert set(run["statuses"]) <= {"certified", "refuted", "undecided"}
+    assert run["total"] > run["seconds"] > 0.0
+    assert run["megabytes"] > 10.0
