@@ -116,6 +116,11 @@ def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]
         if isinstance(mode, Target):
             nodes.append(((mode.name, 0), None, mode))
             continue
+        if mode.reference.region is not None:
+            raise NotBuiltYet(
+                f"build: the references of {mode.label} are a continuous class; continuous classes in a graph are not "
+                "built yet: list the references you need with mg.Points([...]), or look at the flowpipe of the class"
+            )
         for a, p in enumerate(mode.reference.parameters()):
             close_loop(mode, p)
             nodes.append(((mode.name, a), p, mode))

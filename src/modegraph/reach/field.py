@@ -28,7 +28,7 @@ class Field:
     """x' = f(x, t, w, d) on one segment of the reference, with what is observed along it.
 
     Variables of all tapes, in order: states (plant, then memory; in the frame's coordinates where there
-    is a frame), time, disturbance, unknowns.
+    is a frame), time, disturbance, unknowns, among them last the parameters of a class of references.
 
     Attributes
     ----------
@@ -48,6 +48,8 @@ class Field:
         Jacobian and disturbance matrix are constant.
     steady : bool
         The Jacobian is constant.
+    flat : bool
+        f is affine in states, disturbance and unknowns together.
     full_w : bool
         f is not affine in the disturbance.
     autonomous : bool
@@ -59,7 +61,7 @@ class Field:
     states: int
     frame: Frame | None
     disturbances: int
-    unknowns: tuple[str, ...]
+    unknowns: int
     rates: Tape
     jacobian: Tape
     observed: Tape
@@ -67,6 +69,7 @@ class Field:
     outputs: int
     linear: bool
     steady: bool
+    flat: bool
     full_w: bool
     autonomous: bool
     reads: tuple[frozenset[int], ...]
@@ -88,7 +91,7 @@ class Field:
 
     @property
     def variables(self) -> int:
-        return self.first_d + len(self.unknowns)
+        return self.first_d + self.unknowns
 
 
 @dataclass(frozen=True)
@@ -168,7 +171,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
     """Trace -> simplify -> differentiate -> tapes, for one segment, in the coordinates of a frame."""
     graph = loop.graph
     states, disturbance = list(loop.states), list(loop.disturbance)
-    unknowns = list(loop.unknowns.values())
+    unknowns = [*loop.unknowns.values(), *loop.parameters]
     variables = [*states, loop.time, *disturbance, *unknowns]
     written = list(segment.rhs)
     n, nw = len(states), len(disturbance)
@@ -212,13 +215,14 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
     jacobian = [e for row in by_x for e in row] + [e for row in by_w for e in row]
     roots = [e.index for row in (*by_x, *by_w) for e in row]
     linear = all(graph.nodes[k].op == CONST for k in roots)
+    by_unknown = derivative(rates, unknowns) if linear and unknowns else []
     return Field(
         start=segment.start,
         end=segment.end,
         states=n,
         frame=frame,
         disturbances=nw,
-        unknowns=tuple(loop.unknowns),
+        unknowns=len(unknowns),
         rates=compile_tape(rates, variables),
         jacobian=compile_tape([*jacobian, *unique], variables),
         observed=compile_tape(observed, variables),
@@ -226,6 +230,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         outputs=len(segment.tracking),
         linear=linear and not unique,
         steady=all(graph.nodes[k].op == CONST for k in roots[: n * n]),
+        flat=linear and not any(e.depends_on([*states, *disturbance, *unknowns]) for row in by_unknown for e in row),
         full_w=bool(nw) and not affine,
         autonomous=not any(e.depends_on([loop.time]) for e in [*rates, *faces, *unique]),
         reads=tuple(frozenset(k for k in range(n) if rate.depends_on([states[k]])) for rate in rates),

@@ -21,6 +21,7 @@ from ..enclosure.step import (
 )
 from ..expression.tape import Tape
 from .bounds import PolynomialBounds
+from .class_chart import start_polynomials
 from .error_table import error_table
 from .field import Field
 from .framing import generator_box, into_frame, out_of_frame, thinned
@@ -120,7 +121,7 @@ class Flow:
         self.bounds = PolynomialBounds(piece, self.table, self.table.size)
         seen = int(self.table.start[self.seen + 1])
         self.seen_bounds = PolynomialBounds(piece, self.table, seen)
-        p, unknowns, slack = piece.polynomials(self.table.linear, self.table.size)
+        p, unknowns, slack = start_polynomials(piece, self.table)
         self._unknowns = unknowns
         self._errors = error_table(self.table, self.q, n)
         self._spaces: dict[tuple[int, str], dict[str, Any]] = {}
@@ -130,7 +131,10 @@ class Flow:
             fall = np.array([0, 0, 0, 1, 1, 2, 2, 2, 2])
             self._cut = np.maximum(order.degree - fall, 2).astype(np.int64)
         G = np.zeros((0, n, self.small))
-        self.undefined_start = False
+        if not np.isfinite(slack).all():
+            what = "the start set cannot be enclosed over so large a part of the class"
+            self.failure = Failure(0.0, what, "make the class smaller")
+            slack = np.zeros(len(slack))
         if reset is not None and p.shape[0] < n:
             p, slack = self._with_memory(p, slack, reset)
         self.frame = self.fields[0].frame
@@ -157,6 +161,8 @@ class Flow:
         k = len(reset.outputs)
         inputs = np.zeros((len(reset.variables), self.table.size))
         inputs[: len(p)] = p
+        parameters = len(inputs) - len(p)
+        inputs[len(p) :] = self._unknowns[len(self._unknowns) - parameters :]
         radius = np.zeros(len(reset.variables))
         radius[: len(p)] = slack
         z, off, bad = self.evaluate(reset, inputs, radius)

@@ -20,6 +20,7 @@ from .chain import Chain, nonlinear_variable
 from .compiled import CompiledMode, compile_mode
 from .field import Field
 from .flow import Order, generator_box
+from .restrictor import Restrictor
 from .slices import Slice, Slicer, hull
 from .start import Piece
 
@@ -47,7 +48,7 @@ DEFAULT_HORIZON = 10.0
 
 
 class Flowpipe:
-    """An enclosure of all trajectories of one mode under one reference. Made by :func:`flowpipe`.
+    """An enclosure of all trajectories of one mode under one reference, or a class of them. Made by :func:`flowpipe`.
 
     Attributes
     ----------
@@ -65,13 +66,22 @@ class Flowpipe:
         Parts the start set was cut into, and validated steps of all of them.
     """
 
-    def __init__(self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str) -> None:
+    def __init__(
+        self,
+        label: str,
+        states: Sequence[str],
+        horizon: float,
+        chains: Sequence[Chain],
+        stuck: str,
+        one_of: Restrictor | None,
+    ) -> None:
         self.states = tuple(states)
+        self._one_of = one_of
         self.horizon = horizon
         self.complete = not any(chain.failure for chain in chains)
         self._label = label
         self._parts = [[Slicer(flow) for flow in chain.flows] for chain in chains]
-        self._boxes: dict[tuple[float, float], Box] = {}
+        self._boxes: dict[tuple[float, float, bytes], Box] = {}
         begun = all(chain.begun for chain in chains)
         until = min(chain.time for chain in chains)
         instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
@@ -85,31 +95,47 @@ class Flowpipe:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
             self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
 
-    def at(self, t: float) -> Box:
+    def at(self, t: float, r: ArrayLike | None = None) -> Box:
         """Box over states, then memory, around every state that is possible at time t (seconds).
 
+        Parameters
+        ----------
+        r : (k,) array, optional
+            One reference of a continuous class; without it, all of them count.
+
         Raises
         ------
         ModegraphError
-            Before 0 or past the computed time.
+            Before 0 or past the computed time, or if r is not of the class.
         """
-        return self.hull(t, t)
+        return self.hull(t, t, r)
 
-    def hull(self, t0: float, t1: float) -> Box:
+    def hull(self, t0: float, t1: float, r: ArrayLike | None = None) -> Box:
         """Box over states, then memory, around everything passed in the closed interval [t0, t1] (seconds).
 
+        Parameters
+        ----------
+        r : (k,) array, optional
+            One reference of a continuous class; without it, all of them count.
+
         Raises
         ------
         ModegraphError
-            If the interval is empty or leaves the computed time.
+            If the interval is empty or leaves the computed time, or if r is not of the class.
         """
         a, b = self._instant(t0, "t0"), self._instant(t1, "t1")
         if a > b:
             raise ModegraphError(f"{self._label}: flowpipe.hull: t0 = {a:.6g} is after t1 = {b:.6g}; exchange them")
-        if (a, b) not in self._boxes:
+        if r is not None and self._one_of is None:
+            raise ModegraphError(f"{self._label}: this flowpipe is that of one reference; leave r out")
+        p = None if r is None or self._one_of is None else self._one_of.parameters(r)
+        key = a, b, b"" if p is None else p.tobytes()
+        if key not in self._boxes:
             slices = [s for part in self._parts for s in _slices(part, a, b)]
-            self._boxes[a, b] = Box(*hull(slices))
-        return self._boxes[a, b]
+            if p is not None and self._one_of is not None:
+                slices = self._one_of.restricted(slices, p)
+            self._boxes[key] = Box(*hull(slices))
+        return self._boxes[key]
 
     def _instant(self, t: Any, name: str) -> float:
         try:
@@ -203,7 +229,8 @@ def flowpipe(
     Parameters
     ----------
     r : (m,) array, optional
-        Which reference of the mode's class; may be left out when there is only one.
+        Which reference of the mode's class; may be left out when there is only one. For a continuous class,
+        leaving it out gives one flowpipe of all of them, whose ``at`` and ``hull`` take r.
     horizon : float, optional
         Seconds. Default: the mode's horizon; else the duration of its reference; else 10 s.
     start : Set, optional
@@ -216,7 +243,7 @@ def flowpipe(
     """
     if not isinstance(mode, Mode):
         raise ModegraphError(f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each")
-    p = mode.reference.parameters()[mode.match(r)]
+    p = mode.find(r, whole=True)
     if start is not None:
         mode = copy(mode)
         mode.start = start
@@ -224,7 +251,8 @@ def flowpipe(
     end = _horizon(mode, horizon, label)
     compiled = compile_mode(mode, p, observed=False)
     chains, stuck = _Cutting(compiled, end).run()
-    return Flowpipe(label, compiled.loop.names, end, chains, stuck)
+    one_of = Restrictor(mode, compiled) if compiled.parameters else None
+    return Flowpipe(label, compiled.loop.names, end, chains, stuck, one_of)
 
 
 def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
@@ -244,8 +272,8 @@ def monomial_count(variables: int, degree: int) -> int:
 
 
 def orders(compiled: CompiledMode, variables: int) -> list[Order]:
-    """Degrees to try for a piece with so many variables, lowest first. Linear loops need degree 1."""
-    if compiled.linear or variables == 0:
+    """Degrees to try for a piece with so many variables, lowest first. Where all is linear, degree 1 is enough."""
+    if compiled.flat or variables == 0:
         return [Order(1, 0)]
     found: list[Order] = []
     for degree, jacobian in LADDER:
