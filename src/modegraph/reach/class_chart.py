@@ -44,7 +44,10 @@ def class_chart(start: StartClass, unknown_lo: Floats, unknown_hi: Floats) -> Ch
     centre, axes = numbers_at(middle)
     sizes = [np.abs(c) + np.abs(L).sum(axis=1) for c, L in map(numbers_at, map(np.array, [middle, *corners]))]
     rounded = ROUNDED * np.nan_to_num(np.max(sizes, axis=0), nan=0.0, posinf=0.0)
-    return Chart(centre, axes, start.set.round, None, unknown_lo, unknown_hi, form=tape, rounded=rounded)
+    return Chart(
+        centre, axes, start.set.round, None, unknown_lo, unknown_hi,
+        parameters=len(middle), form=tape, rounded=rounded,
+    )  # fmt: skip
 
 
 def _form(start: StartClass) -> tuple[Tape, list[int]]:
@@ -120,9 +123,9 @@ def require_same_start(start: StartClass, chart: Chart, instance: Set, p: Floats
     )
 
 
-def parameters_of(piece: Piece, count: int) -> list[tuple[int, int]]:
-    """Which variables of a piece are among the last ``count`` unknowns: (variable, number of the parameter)."""
-    first = len(piece.chart.unknown_lo) - count
+def parameters_of(piece: Piece) -> list[tuple[int, int]]:
+    """Which variables of a piece are parameters of the class: (variable, number of the parameter)."""
+    first = len(piece.chart.unknown_lo) - piece.chart.parameters
     return [(piece.chart.free + k, int(i) - first) for k, i in enumerate(piece.uncertain) if i >= first]
 
 

@@ -77,7 +77,7 @@ class CompiledMode:
     def whole(self) -> Piece:
         ranges = [*self.unknowns.values(), *self.parameters]
         if not isinstance(self.start, StartClass):
-            return whole(self.start, ranges)
+            return whole(self.start, ranges, len(self.parameters))
         lo, hi = (np.array(side, float) for side in zip(*ranges, strict=True))
         return Piece.whole(class_chart(self.start, lo, hi))
 

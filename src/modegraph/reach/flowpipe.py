@@ -19,26 +19,15 @@ from ..model.sets import Box, Set
 from .chain import Chain, nonlinear_variable
 from .compiled import CompiledMode, compile_mode
 from .field import Field
-from .flow import Order, generator_box
+from .flow import Order
+from .ladder import class_orders, is_light, orders
+from .looseness import is_loose, is_very_loose, remainder
 from .restrictor import Restrictor
 from .slices import Slice, Slicer, hull
 from .start import Piece
 
 Floats = NDArray[np.float64]
 
-LADDER = ((3, 1), (4, 3), (6, 3), (8, 4), (10, 4))
-"""Degrees of p and of the Jacobian flow; higher ones are tried where lower ones are loose or break down."""
-LIGHT_MONOMIALS, MOST_LIGHT = 130, 8
-"""The first degree tried is the highest with at most so many monomials, up to this: they cost nothing."""
-MOST_MONOMIALS, MOST_GENERATOR_MONOMIALS = 500, 100
-MOST_HEAVY_MONOMIALS = 2000
-"""A degree with more than the first number is tried only where one below is complete but very loose."""
-MOST_DISTURBED = 6
-"""Highest degree with a disturbance: there the remainder is what the disturbance adds."""
-LOOSE = 5e-3
-"""Share of the remainder in the width of the last set above which a higher degree is tried."""
-VERY_LOOSE = 0.25
-"""The same share, above which a run of low degree is given up for the next one."""
 MOST_PIECES = 32
 DEEPEST_CUT = 7
 PROGRESS = 1.05
@@ -267,31 +256,6 @@ def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
     return end
 
 
-def monomial_count(variables: int, degree: int) -> int:
-    return math.comb(variables + degree, degree)
-
-
-def orders(compiled: CompiledMode, variables: int) -> list[Order]:
-    """Degrees to try for a piece with so many variables, lowest first. Where all is linear, degree 1 is enough."""
-    if compiled.flat or variables == 0:
-        return [Order(1, 0)]
-    found: list[Order] = []
-    for degree, jacobian in LADDER:
-        if found and degree > MOST_DISTURBED and compiled.w_radius.any():
-            break
-        count = monomial_count(variables, degree)
-        if found and count > MOST_HEAVY_MONOMIALS:
-            break
-        while jacobian > 1 and math.comb(variables + jacobian, jacobian) > MOST_GENERATOR_MONOMIALS:
-            jacobian -= 1
-        order = Order(degree, jacobian)
-        if count <= LIGHT_MONOMIALS and degree <= MOST_LIGHT:
-            found = [order]
-        else:
-            found.append(order)
-    return found
-
-
 @dataclass(frozen=True)
 class _Part:
     """A piece with its best chain: which rung of the ladder made it, and the last rung worth trying."""
@@ -312,7 +276,10 @@ class _Cutting:
     def run(self) -> tuple[list[Chain], str]:
         """A chain for each piece, and why cutting ended where it failed."""
         whole = self.compiled.whole()
-        ladder = orders(self.compiled, whole.variables)
+        if self.compiled.parameters:
+            ladder = class_orders(self.compiled, whole, self.end)
+        else:
+            ladder = orders(self.compiled, whole.variables)
         with one_core():
             parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
             stuck = ""
@@ -335,15 +302,15 @@ class _Cutting:
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""
-        light = [monomial_count(piece.variables, order.degree) <= MOST_MONOMIALS for order in ladder]
+        light = [is_light(order, piece) for order in ladder]
         best: _Part | None = None
         given_up: _Part | None = None
         for rung in range(first, top + 1):
-            if best is not None and not light[rung] and (best.chain.failure or not _very_loose(best.chain)):
+            if best is not None and not light[rung] and (best.chain.failure or not is_very_loose(best.chain)):
                 break
             chain = Chain(self.compiled, self.framed, piece, ladder[rung])
             impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
-            done = chain.run(self.end, _very_loose if impatient else None)
+            done = chain.run(self.end, is_very_loose if impatient else None)
             if done and chain.time < self.end:
                 given_up = _Part(chain, rung, top)
                 continue
@@ -354,7 +321,7 @@ class _Cutting:
             if best is not None and not _further(chain, best.chain):
                 return replace(best, top=best.rung)
             best = _Part(chain, rung, top)
-            if not chain.begun or (done and (self.disturbed or not _loose(chain))):
+            if not chain.begun or (done and (self.disturbed or not is_loose(chain))):
                 break
         assert best is not None
         return best
@@ -364,21 +331,4 @@ def _further(chain: Chain, other: Chain) -> bool:
     """Whether a chain of higher degree is worth its cost: it gets further, or is narrower at the end."""
     if chain.failure or other.failure:
         return not chain.failure or chain.time > PROGRESS * other.time
-    return float(_remainder(chain)[0].max()) < float(_remainder(other)[0].max())
-
-
-def _remainder(chain: Chain) -> tuple[Floats, Floats]:
-    """Radii (n,) of the last set: of its remainder, and of its polynomial part."""
-    flow = chain.flows[-1]
-    p, G = flow.state_set(len(flow.steps))
-    return generator_box(G), np.abs(p[:, 1:]).sum(axis=1)
-
-
-def _loose(chain: Chain, share: float = LOOSE) -> bool:
-    """Whether the remainder counts in the width of the last set, beyond what time steps leave."""
-    z, own = _remainder(chain)
-    size = float(np.abs(chain.flows[-1].set_at(0)[0]).sum(axis=1).max())
-    return bool((z > share * own + 1e-6 * size).any())
-
-
-_very_loose = partial(_loose, share=VERY_LOOSE)
+    return float(remainder(chain)[0].max()) < float(remainder(other)[0].max())

@@ -38,8 +38,7 @@ UNDERFLOW = 2.0**-1000
 class Chart:
     """{c + L xi : xi in [-1, 1]^m}, optionally |xi|_2 <= 1, encloses a start set; plus the unknowns.
 
-    ``faces`` (A, b): A xi <= b holds for every start, for Polytopes (rounded outward). The parameters of a
-    continuous class of references are the last of the unknowns.
+    ``faces`` (A, b): A xi <= b holds for every start, for Polytopes (rounded outward).
     """
 
     centre: Floats
@@ -52,6 +51,8 @@ class Chart:
     """The starts themselves, not a later reach set."""
     sublevel: Sublevel | None = None
     """Only points of this set count; the axes are then parallel to the coordinates."""
+    parameters: int = 0
+    """How many of the unknowns, the last ones, are parameters of a class of references."""
     form: Tape | None = None
     """The starts as a function of xi and the parameters; centre and axes are then those of one reference."""
     rounded: Floats | None = None
@@ -66,7 +67,7 @@ class Chart:
 
     def around(self, centre: Floats, axes: Floats, original: bool) -> Chart:
         """A chart of the parallelotope centre + axes [-1, 1]^k, with the same unknowns."""
-        return Chart(centre, axes, False, None, self.unknown_lo, self.unknown_hi, original)
+        return Chart(centre, axes, False, None, self.unknown_lo, self.unknown_hi, original, parameters=self.parameters)
 
     def box(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
         """A box of states that holds c + L xi for lo <= xi <= hi, for axes parallel to the coordinates."""
@@ -252,8 +253,8 @@ class Piece:
         return np.asarray(np.fmin(box * (1.0 + 4.0 * len(self.lo) * UNIT), ball + slack))
 
 
-def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
-    """The piece that covers a bounded start set and all unknown constants."""
+def whole(start: Set, unknowns: Sequence[tuple[float, float]], parameters: int = 0) -> Piece:
+    """The piece that covers a bounded start set and all unknown constants, of which the last may be parameters."""
     cut: Sublevel | None = None
     if isinstance(start, Sublevel):
         if start.ellipsoids is None:
@@ -263,7 +264,7 @@ def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
     centre, axes, ball, faces = _chart(start)
     lo = np.array([u[0] for u in unknowns], float)
     hi = np.array([u[1] for u in unknowns], float)
-    chart = Chart(centre, axes, ball, faces, lo, hi, sublevel=cut)
+    chart = Chart(centre, axes, ball, faces, lo, hi, sublevel=cut, parameters=parameters)
     piece = Piece.whole(chart).tightened()
     if piece is None:
         raise ModegraphError("the start set is empty: no edge can be proved from it")

@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 
 
 def holds(piece: Piece, p: Floats) -> bool:
-    """Whether the parameters p (k,), the last of the unknowns, are among those of a piece."""
-    return all(abs(_scaled(piece, variable, p[k])) <= 1 for variable, k in parameters_of(piece, len(p)))
+    """Whether the parameters p (k,) are among those of a piece."""
+    return all(abs(_scaled(piece, variable, p[k])) <= 1 for variable, k in parameters_of(piece))
 
 
 def _scaled(piece: Piece, variable: int, value: float) -> Fraction:
@@ -27,7 +27,7 @@ def _scaled(piece: Piece, variable: int, value: float) -> Fraction:
 
 
 class Substitution:
-    """Parameters p (k,), the last unknowns of a flow, put into polynomials over its piece.
+    """Parameters p (k,) put into polynomials over its piece.
 
     A parameter is c + r eta, eta the variable of the flow; eta = (p - c) / r is rounded to nearest. The
     variable disappears: what is left is a polynomial over the same table. The piece of the flow must hold p.
@@ -38,7 +38,7 @@ class Substitution:
         size = len(exponents)
         factor = np.ones(size)
         rest = exponents.copy()
-        for variable, k in parameters_of(flow.piece, len(p)):
+        for variable, k in parameters_of(flow.piece):
             eta = _scaled(flow.piece, variable, p[k])
             assert abs(eta) <= 1
             factor = factor * float(eta) ** exponents[:, variable]
