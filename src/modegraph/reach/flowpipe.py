@@ -21,7 +21,7 @@ from .compiled import CompiledMode, compile_mode
 from .field import Field
 from .flow import Order
 from .ladder import class_orders, is_light, orders
-from .looseness import is_loose, is_very_loose, remainder
+from .looseness import is_loose, is_very_loose, looseness, remainder
 from .restrictor import Restrictor
 from .slices import Slice, Slicer, hull
 from .start import Piece
@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 
 MOST_PIECES = 32
 DEEPEST_CUT = 7
+MOST_LOOSE_PIECES, WORTH_CUTTING = 8, 0.8
+"""A class of references that is very loose is cut into at most so many, while halves are by this much tighter."""
 PROGRESS = 1.05
 """A cut or a higher degree must get this much further, or it is the last one."""
 DEFAULT_HORIZON = 10.0
@@ -289,16 +291,31 @@ class _Cutting:
                 if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
                     stuck = "; no more are tried"
                     break
-                halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
-                children = list(
-                    in_parallel([partial(self._best, half, ladder, worst.rung, worst.top) for half in halves])
-                )
+                children = self._halves(worst, ladder)
                 ended = [child.chain.time for child in children if child.chain.failure]
                 if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
                     stuck = "; cutting it gets no further"
                     break
                 parts = [part for part in parts if part is not worst] + children
+            if self.compiled.parameters and not stuck and not self.disturbed:
+                parts = self._tighter(parts, ladder)
         return [part.chain for part in parts], stuck
+
+    def _halves(self, part: _Part, ladder: Sequence[Order]) -> list[_Part]:
+        halves = part.chain.piece.split(nonlinear_variable(part.chain.flows[0]))
+        return list(in_parallel([partial(self._best, half, ladder, part.rung, part.top) for half in halves]))
+
+    def _tighter(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
+        """Pieces of a class of references, the loosest cut as long as they are very loose and that helps."""
+        while len(parts) < MOST_LOOSE_PIECES:
+            loosest = max(parts, key=lambda part: looseness(part.chain))
+            if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
+                break
+            children = self._halves(loosest, ladder)
+            if max(looseness(child.chain) for child in children) > WORTH_CUTTING * looseness(loosest.chain):
+                break
+            parts = [part for part in parts if part is not loosest] + children
+        return parts
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""

@@ -23,8 +23,8 @@ MOST_DISTURBED = 6
 CLASS_LADDER = ((5, 3), (6, 3), (7, 4), (8, 4), (9, 4), (10, 4))
 CLASS_MONOMIALS, CLASS_GENERATOR_MONOMIALS = 1200, 120
 """Of a class of references the first of these degrees is tried, and the highest with at most so many monomials."""
-STRAIGHT = 0.05
-"""A variable counts twice where its nonlinear terms have less than this share of the most nonlinear one's."""
+STRAIGHT = 0.2
+"""A variable counts twice where its nonlinear terms are smaller than this, relative to the geometric mean."""
 
 
 def orders(compiled: CompiledMode, variables: int) -> list[Order]:
@@ -58,7 +58,7 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
         return found
     probe = Chain(compiled, compiled.fields, piece, found[0])
     disturbed = bool(compiled.w_radius.any())
-    done = probe.run(end, is_very_loose) and probe.time >= end
+    done = probe.run(end)
     if done and not disturbed and not is_loose(probe):
         return found[:1]
     weights = _weights(probe)
@@ -69,7 +69,7 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
         while jacobian > 1 and monomial_count(weights, jacobian) > CLASS_GENERATOR_MONOMIALS:
             jacobian -= 1
         rungs.append(Order(degree, jacobian, weights))
-    low = done or disturbed
+    low = disturbed or (done and not is_very_loose(probe))
     return [rungs[0], rungs[-1]] if low and len(rungs) > 1 else rungs[-1:]
 
 
@@ -82,7 +82,8 @@ def _weights(chain: Chain) -> tuple[int, ...]:
         scale = np.maximum(size[:, 1:].sum(axis=1), 1e-300)
         for v in range(len(share)):
             share[v] = max(share[v], float((size[:, exponents[:, v] > 1].sum(axis=1) / scale).max()))
-    return tuple((np.where(share < STRAIGHT * share.max(initial=0.0), 2, 1)).tolist())
+    typical = np.exp(np.log(np.maximum(share, 1e-12)).mean())
+    return tuple(np.where(share < STRAIGHT * typical, 2, 1).tolist())
 
 
 def is_light(order: Order, piece: Piece) -> bool:

@@ -34,6 +34,14 @@ def remainder(chain: Chain) -> tuple[Floats, Floats]:
     return generator_box(G), np.abs(p[:, own]).sum(axis=1)
 
 
+def looseness(chain: Chain) -> float:
+    """The largest share of the remainder in the width of a state; inf where the flowpipe failed."""
+    if chain.failure:
+        return np.inf
+    z, own = remainder(chain)
+    return float((z / np.maximum(own, 1e-300)).max())
+
+
 def is_loose(chain: Chain, share: float | None = None) -> bool:
     """Whether the remainder counts in the width of the last set, beyond what time steps leave."""
     if share is None:
