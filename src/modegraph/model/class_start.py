@@ -17,6 +17,8 @@ from modegraph.expression.trace import call
 from modegraph.model.mode import Mode
 from modegraph.model.reference import Floats, text_of
 from modegraph.model.sets import Box, Set
+from modegraph.model.sets.exact import fractions
+from modegraph.model.sets.level_function import Irrational, exact_value
 from modegraph.model.sets.parametrised import Condition, ParametrisedSet, TracedSet
 from modegraph.model.start import checked_start, mode_start, require_dimension
 from modegraph.model.traced_reference import TracedReference
@@ -69,8 +71,8 @@ def class_start(mode: Mode) -> StartClass | Set:
     if isinstance(mode.start, Set):
         return checked_start(mode, mode.start, owner)
     graph = Graph()
-    time = graph.variable("t")
     parameters = graph.variables([f"p[{k}]" for k in range(region.dim)])
+    time = graph.variable("t")
     first = mode.reference.pieces(graph, time, parameters, owner)[0]
     value, dot, ddot = (at_instant(part, time, 0.0) for part in (first.value, first.dot, first.ddot))
     reference = TracedReference.of(value, dot, ddot, parameters)
@@ -84,6 +86,30 @@ def class_start(mode: Mode) -> StartClass | Set:
     _require_existence(entries, dropped, traced.conditions, parameters, region, f"{owner}, start")
     middle = mode_start(mode, region.center)
     return StartClass(parameters, region, traced, np.asarray(middle.center, float))
+
+
+def _decided_exactly(condition: Condition, parameters: Sequence[Expr], region: Box, where: str) -> bool:
+    """Whether a condition is affine in the parameters: then the worst corner of the class decides it, exactly."""
+    slopes = derivative([condition.expr], parameters)[0]
+    if not all(slope.is_constant for slope in slopes):
+        return False
+    corner = np.array([b if slope.value < 0 else a for slope, a, b in zip(slopes, region.lo, region.hi, strict=True)])
+    try:
+        worst = exact_value(condition.expr.graph, condition.expr.index, fractions(corner))
+    except Irrational:
+        return False
+    if worst is None:
+        return False
+    if worst < 0:
+        raise _empty(condition, corner, where)
+    return True
+
+
+def _empty(condition: Condition, p: Floats, where: str) -> ModegraphError:
+    return ModegraphError(
+        f"{where}: {condition.wrong} for the reference {text_of(p)}, so its start set is empty and everything would "
+        "be true of it; correct the formula, or the class"
+    )
 
 
 def _require_existence(
@@ -103,6 +129,7 @@ def _require_existence(
     """
     from modegraph.enclosure.intervals import IntervalEvaluator
 
+    conditions = [c for c in conditions if not _decided_exactly(c, parameters, region, where)]
     ranges = IntervalEvaluator(compile_tape([*(c.expr for c in conditions), *entries, *dropped], parameters))
     count = len(conditions)
 
@@ -116,10 +143,7 @@ def _require_existence(
         for k, condition in enumerate(conditions):
             bad = np.flatnonzero(high[k] < 0.0)
             if len(bad):
-                raise ModegraphError(
-                    f"{where}: {condition.wrong} for the reference {text_of(points[bad[0]])}, so its start set is "
-                    "empty and everything would be true of it; correct the formula, or the class"
-                )
+                raise _empty(condition, points[bad[0]], where)
 
     lo, hi = region.lo[None], region.hi[None]
     corners = np.stack(np.meshgrid(*zip(region.lo, region.hi, strict=True), indexing="ij"), axis=-1)
