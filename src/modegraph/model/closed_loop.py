@@ -15,7 +15,7 @@ from modegraph.expression.scalar import Expr, Graph
 from modegraph.expression.trace import as_vector, call, required_arguments
 from modegraph.model.constraints import Face, faces_of
 from modegraph.model.mode import Mode
-from modegraph.model.numeric import require_finite_values
+from modegraph.model.numeric import require_finite_values, typical_values
 from modegraph.model.reference import Floats, Piece
 from modegraph.model.start import mode_start
 from modegraph.model.switching_times import jumps, switching_times
@@ -70,6 +70,8 @@ class ClosedLoop:
         Variables: the parameters of the references; empty for one reference.
     segments : list[Segment]
         Contiguous from t = 0 to ``inf``.
+    typical : (nvar, B) array
+        Values of states, time, disturbance, unknowns and parameters around the centre of the start set.
     reset : list[Expr]
         Memory on entry (k,) as a function of the plant states and the parameters.
     """
@@ -82,6 +84,7 @@ class ClosedLoop:
     unknowns: dict[str, Expr]
     parameters: list[Expr]
     segments: list[Segment]
+    typical: Floats
     reset: list[Expr]
     has_constraints: bool
 
@@ -99,6 +102,8 @@ def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
         If a function of the mode is wrong. Names mode, function and remedy.
     """
     p = mode.find(p, whole=True)
+    some = mode.reference.region.center if p is None and mode.reference.region is not None else p
+    start = mode_start(mode, some)
     trace = _Trace(mode, p)
     segments = [segment for piece in trace.pieces for segment in trace.segments(piece)]
     loop = ClosedLoop(
@@ -110,11 +115,11 @@ def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
         unknowns=dict(trace.d),
         parameters=trace.p,
         segments=segments,
+        typical=typical_values(mode, start, None if p is not None else mode.reference.region),
         reset=trace.reset(),
         has_constraints=mode.constraints is not None,
     )
-    some = mode.reference.region.center if p is None and mode.reference.region is not None else p
-    require_finite_values(mode, some, mode_start(mode, some))
+    require_finite_values(mode, some, start)
     return loop
 
 

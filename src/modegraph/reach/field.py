@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..expression.derivative import derivative
 from ..expression.ops import CONST, LOG, RECIP, VAR, WHERE
+from ..expression.residual import residual
 from ..expression.scalar import Expr, Graph
 from ..expression.simplify import simplify
 from ..expression.tape import Tape, compile_tape
@@ -183,6 +184,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         at_zero = graph.rewrite([e.index for e in written], known={w.index: zero for w in disturbance})
         parts = [Expr(graph, k) for k in at_zero] + [e for row in by_w for e in row]
         parts = simplify(parts, seconds=SIMPLIFY_SECONDS).exprs
+        parts[:n] = residual(parts[:n], variables, loop.typical, unknowns, seconds=SIMPLIFY_SECONDS)
         rates = []
         for i in range(n):
             rate = parts[i]
@@ -192,6 +194,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         by_w = [parts[n + i * nw : n + (i + 1) * nw] for i in range(n)]
     else:
         rates = simplify(written, seconds=SIMPLIFY_SECONDS).exprs
+        rates = residual(rates, variables, loop.typical, unknowns, seconds=SIMPLIFY_SECONDS)
         by_w = derivative(rates, disturbance) if nw else by_w
     obligations += _obligations(graph, [*graph.dropped, *(e.index for e in rates)])
     unique = [Expr(graph, k) for k in dict.fromkeys(obligations)]

@@ -21,7 +21,7 @@ MOST_HEAVY_MONOMIALS = 2000
 MOST_DISTURBED = 6
 """Highest degree with a disturbance: there the remainder is what the disturbance adds."""
 CLASS_LADDER = ((5, 3), (6, 3), (7, 4), (8, 4), (9, 4), (10, 4))
-CLASS_MONOMIALS, CLASS_GENERATOR_MONOMIALS = 1200, 120
+CLASS_MONOMIALS, CLASS_GENERATOR_MONOMIALS = 1600, 200
 """Of a class of references the first of these degrees is tried, and the highest with at most so many monomials."""
 STRAIGHT = 0.2
 """A variable counts twice where its nonlinear terms are smaller than this, relative to the geometric mean."""
