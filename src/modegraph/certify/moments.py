@@ -54,6 +54,11 @@ class Moments:
     _spread: Floats
     _farthest: float
 
+    @property
+    def affine(self) -> bool:
+        """The moments are affine in the reference."""
+        return bool((self._exponents.sum(axis=1) <= 1).all() or not self._rows[:, :, self._exponents.sum(axis=1) > 1].any())
+
     def holds(self, p: Floats) -> NDArray[np.bool_]:
         """Which references (B, k) this flow is for."""
         return np.asarray(((p >= self.lo) & (p <= self.hi)).all(axis=1))
@@ -134,3 +139,15 @@ def _spreads(flow: Flow, target: TargetClass, rest: Floats, G: Sequence[Floats])
     z = generator_sizes(target.rows, G)
     size = np.abs(rest).sum(axis=2) @ np.abs(target.rows).T + z
     return np.asarray(flow.bounds.upper(np.einsum("fi,kij->kfj", target.rows, rest)) + z + 64.0 * UNIT * size)
+
+
+def at_state(x: Floats, target: TargetClass) -> Moments:
+    """One state (n,), reached at once."""
+    none = np.zeros(0)
+    rows = (target.rows @ x)[None, :, None]
+    size = (np.abs(target.rows) @ np.abs(x))[None]
+    spread = np.zeros((1, 1 if target.round else len(target.rows)))
+    return Moments(
+        none, none, np.zeros(1), np.zeros(1), target, none, none, [], np.zeros((1, 0), np.int64), rows, size, spread,
+        float(np.abs(x).sum()),
+    )  # fmt: skip

@@ -241,7 +241,8 @@ def flowpipe(
     label = f"mode {mode.label_of(p)!r}"
     end = _horizon(mode, horizon, label)
     compiled = compile_mode(mode, p, observed=False)
-    chains, stuck = _Cutting(compiled, end).run()
+    with one_core():
+        chains, stuck = Cutting(compiled, end).run()
     one_of = Restrictor(mode, compiled) if compiled.parameters else None
     return Flowpipe(label, compiled.loop.names, end, chains, stuck, one_of)
 
@@ -267,7 +268,7 @@ class _Part:
     top: int
 
 
-class _Cutting:
+class Cutting:
     """Pieces of the start set, cut where the flowpipe ends first, as long as that gets further."""
 
     def __init__(self, compiled: CompiledMode, end: float) -> None:
@@ -282,23 +283,22 @@ class _Cutting:
             ladder = class_orders(self.compiled, whole, self.end)
         else:
             ladder = orders(self.compiled, whole.variables)
-        with one_core():
-            parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
-            stuck = ""
-            while not stuck and any(part.chain.failure for part in parts):
-                worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-                piece = worst.chain.piece
-                if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
-                    stuck = "; no more are tried"
-                    break
-                children = self._halves(worst, ladder)
-                ended = [child.chain.time for child in children if child.chain.failure]
-                if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
-                    stuck = "; cutting it gets no further"
-                    break
-                parts = [part for part in parts if part is not worst] + children
-            if self.compiled.parameters and not stuck and not self.disturbed:
-                parts = self._tighter(parts, ladder)
+        parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
+        stuck = ""
+        while not stuck and any(part.chain.failure for part in parts):
+            worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
+            piece = worst.chain.piece
+            if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+                stuck = "; no more are tried"
+                break
+            children = self._halves(worst, ladder)
+            ended = [child.chain.time for child in children if child.chain.failure]
+            if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
+                stuck = "; cutting it gets no further"
+                break
+            parts = [part for part in parts if part is not worst] + children
+        if self.compiled.parameters and not stuck and not self.disturbed:
+            parts = self._tighter(parts, ladder)
         return [part.chain for part in parts], stuck
 
     def _halves(self, part: _Part, ladder: Sequence[Order]) -> list[_Part]:
