@@ -10,7 +10,7 @@ import pytest
 import modegraph as mg
 from tests.soundness.families import FAMILIES, Family, references, runs
 
-RUNS, EACH, SOME = 2500, 60, 12
+RUNS, EACH, SOME = 2500, 100, 5
 """Runs under as many references; runs under each of some references."""
 TOLERANCE = 2e-9
 
