@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 import modegraph as mg
@@ -38,6 +40,28 @@ def test_the_polynomial_with_the_parameters_fixed() -> None:
     apart = np.abs(powers @ p.T - powers @ fixed.T)
     assert (apart <= out + 1e-14).all()
     assert (out < 1e-11).all()
+
+
+def test_rounding_is_in_the_box() -> None:
+    """Against exact arithmetic, coefficient by coefficient."""
+    flow = flow_of()
+    p = flow.steps[-1].p
+    fixed, out = Substitution(flow, P)(p, np.zeros(2))
+    exponents = flow.bounds.exponents
+    factor = [Fraction(1)] * len(exponents)
+    rest = exponents.copy()
+    for v, k in parameters_of(flow.piece):
+        centre, radius = scale_of(flow.piece, v)
+        eta = (Fraction(float(P[k])) - Fraction(centre)) / Fraction(radius)
+        factor = [f * eta ** int(e[v]) for f, e in zip(factor, exponents, strict=True)]
+        rest[:, v] = 0
+    for row, found, room in zip(p, fixed, out, strict=True):
+        exact: dict[tuple[int, ...], Fraction] = {}
+        for c, f, e in zip(row, factor, rest.tolist(), strict=True):
+            exact[tuple(e)] = exact.get(tuple(e), Fraction(0)) + Fraction(float(c)) * f
+        given = {tuple(e): Fraction(float(c)) for c, e in zip(found, exponents.tolist(), strict=True)}
+        apart = sum(abs(exact.get(e, Fraction(0)) - c) for e, c in given.items())
+        assert 0 < apart <= Fraction(float(room))
 
 
 def test_the_end_of_the_class_is_in_it() -> None:

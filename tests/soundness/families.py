@@ -220,4 +220,35 @@ def quotient() -> Family:
     ), 3.0)  # fmt: skip
 
 
-FAMILIES = {make.__name__: make for make in (pendulum, pushed, oscillator, follower, quotient)}
+def arm() -> Family:
+    """Computed torque for an arm whose second mass is not quite known: quotients near the identity."""
+
+    def inertia(q: Any, m: Any) -> tuple[Any, Any, Any]:
+        c = 0.5 * m * np.cos(q)
+        return 1.0 / 3.0 + 4.0 / 3.0 * m + 2.0 * c, m / 3.0 + c, m / 3.0
+
+    def swirl(x: Any, m: Any) -> tuple[Any, Any]:
+        s = 0.5 * m * np.sin(x[1])
+        return -s * x[3] * (2.0 * x[2] + x[3]), s * x[2] ** 2
+
+    def dynamics(x: Any, u: Any, d: Any) -> Any:
+        a, b, c = inertia(x[1], d["m"])
+        e, f = swirl(x, d["m"])
+        r, s = u[0] - e, u[1] - f
+        det = a * c - b * b
+        return np.array([x[2], x[3], (c * r - b * s) / det, (a * s - b * r) / det])
+
+    def torque(x: Any, r: Any) -> Any:
+        a, b, c = inertia(x[1], 1.0)
+        e, f = swirl(x, 1.0)
+        v, w = -9.0 * (x[0] - r[0]) - 6.0 * x[2], -9.0 * (x[1] - r[1]) - 6.0 * x[3]
+        return np.array([a * v + b * w + e, b * v + c * w + f])
+
+    plant = mg.System(dynamics, states="q1 q2 v1 v2", inputs="u1 u2", unknowns={"m": (0.95, 1.05)})
+    return Family("arm", mg.Mode(
+        "arm", plant, controller=torque, reference=mg.setpoint(mg.Box([0.1, 0.9], [0.3, 1.1])),
+        start=lambda r: mg.Ellipsoid(np.array([0.5 * r[0], r[1], 0.0, 0.0]), np.diag([0.01, 0.01, 0.02, 0.02])),
+    ), 1.5)  # fmt: skip
+
+
+FAMILIES = {make.__name__: make for make in (pendulum, pushed, oscillator, follower, quotient, arm)}

@@ -101,9 +101,7 @@ def compile_reset(loop: ClosedLoop) -> Tape | None:
     return compile_tape(loop.reset, [*loop.states[: len(loop.states) - len(loop.reset)], *loop.parameters])
 
 
-def compile_mode(
-    mode: Mode, p: Floats | None, start: Set | StartClass | None = None, *, observed: bool = True
-) -> CompiledMode:
+def compile_mode(mode: Mode, p: Floats | None, start: Set | None = None, *, observed: bool = True) -> CompiledMode:
     """Trace and compile a mode; raises `ModegraphError` where the model is wrong.
 
     For a continuous class of references, p = None stands for all of it. Without ``observed``, the states alone
@@ -114,14 +112,13 @@ def compile_mode(
         bare = [replace(segment, constraints=[], inputs=[], tracking=[]) for segment in loop.segments]
         loop = replace(loop, segments=bare)
     region = mode.reference.region if loop.parameters else None
-    if start is None:
-        start = mode_start(mode, p) if region is None else class_start(mode)
+    starts = start if start is not None else mode_start(mode, p) if region is None else class_start(mode)
     centre, radius = disturbance_box(mode.system.disturbance)
     unknowns = {name: (float(lo), float(hi)) for name, (lo, hi) in (mode.system.unknowns or {}).items()}
     return CompiledMode(
         loop=loop,
         fields=[compile_field(loop, segment) for segment in loop.segments],
-        start=start,
+        start=starts,
         reset=compile_reset(loop),
         w_centre=centre,
         w_radius=radius,

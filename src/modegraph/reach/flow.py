@@ -29,6 +29,7 @@ from .grid import next_instant
 from .pointwise import evaluate_over, workspace
 from .records import Failure, Order, Step
 from .start import Piece
+from .step_control import feeding_cap
 
 Floats = NDArray[np.float64]
 
@@ -54,10 +55,6 @@ LATE_FEEDBACK = 0.4
 """The share for flows that were restarted twice: then the set is small, and restarting only widens it."""
 FINE_RATE_CAP = 0.05
 """The same where steps are cheap: linear loops and up to three states."""
-SLOW_RATE = 0.25
-"""Largest spectral radius of h A0 at which nothing is gained by shorter steps."""
-FEEDING = 0.05
-"""Rate at which the remainder may feed itself, relative to the spectral radius of the Jacobian."""
 SHORTER_LOOKS = 4
 """How often a step is cut to a quarter because a constraint cannot be proved between its ends."""
 SMALLEST_STEP = 1e-7
@@ -253,7 +250,7 @@ class Flow:
                 if caps < 0.5 and h > 1e-4:
                     h_try = h * caps
                     continue
-                factor = min(factor, caps, self._feeding_cap(outcome, h))
+                factor = min(factor, caps, feeding_cap(self.piece, outcome))
                 seen = self._observe(fld, h, tube)
                 look = shortened < SHORTER_LOOKS and h > 1e-6 and not (seen[0] <= 0.0).all()
                 # Between the ends a constraint is bounded through its bend: try a shorter look.
@@ -277,19 +274,6 @@ class Flow:
             self._fail(fld, NO_CONTRACTION, 0)
             return False
         return True
-
-    def _feeding_cap(self, outcome: Any, h: float) -> float:
-        """How much longer the next step may be before truncated products feed the remainder as fast as it decays.
-
-        For classes of references: their polynomials stay wide for all time, while one reference's set shrinks.
-        """
-        _, _, _, G, _, _, rest, control = outcome
-        z = generator_box(G)
-        if not self.piece.chart.parameters or control[4] < 0.5 or control[3] <= SLOW_RATE or not (z > 0.0).all():
-            return 1.6
-        feeding = float((rest / z).max()) * control[4]
-        # What a step adds to the rate grows with the square of its length, or faster; the rest stays.
-        return max(SLOW_RATE / control[3], (FEEDING * control[3] / feeding) ** 0.5)
 
     def _rate_cap(self, fld: Field) -> float:
         if not self.w_radius.any():
