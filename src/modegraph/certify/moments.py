@@ -53,11 +53,18 @@ class Moments:
     _size: Floats
     _spread: Floats
     _farthest: float
+    whole: bool = True
+    """This flow is for every reference of the class."""
 
     @property
     def affine(self) -> bool:
         """The moments are affine in the reference."""
-        return bool((self._exponents.sum(axis=1) <= 1).all() or not self._rows[:, :, self._exponents.sum(axis=1) > 1].any())
+        return not self._rows[:, :, self._exponents.sum(axis=1) > 1].any()
+
+    @property
+    def is_constant(self) -> bool:
+        """The moments do not depend on the reference, and this flow is for all of them."""
+        return not self._rows[:, :, self._exponents.sum(axis=1) > 0].any() and self.whole
 
     def holds(self, p: Floats) -> NDArray[np.bool_]:
         """Which references (B, k) this flow is for."""
@@ -120,6 +127,7 @@ def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int)
         exponents[pure][:, ~others], np.einsum("fi,kij->kfj", target.rows, p[:, :, pure]),
         np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(flow, target, rest, G),
         float(np.abs(p).sum(axis=2).max() + max(np.abs(g).sum() for g in G)),
+        all(flow.piece.lo[v] == -1.0 and flow.piece.hi[v] == 1.0 for v, _ in own),
     )  # fmt: skip
 
 

@@ -82,6 +82,13 @@ class Relation:
         flows = [flow for part in self.parts for flow in part.flows]
         return float(max(f.times.max() for f in flows)), float(max(f.energy.max() for f in flows))
 
+    @property
+    def ignores(self) -> tuple[bool, bool]:
+        """Whether what is certified does not depend on the source's reference, or not on the target's."""
+        flows = [flow for part in self.parts for flow in part.flows]
+        fixed = self.goal.affine is not None and not self.goal.affine[1].any()
+        return all(flow.is_constant for flow in flows), fixed
+
     def crossings(self, source: Floats, target: Floats) -> Crossings:
         """Decide pairs: source (B, ki) and target (B, kj) references, inside their classes."""
         B = len(source)
@@ -148,7 +155,8 @@ class Relation:
             apart = ~part.meets(lo[0], hi[0])
             certified &= (worst.min(axis=1) <= 1.0) | apart
         separated = self._separated(source, target).reshape(B, count, -1)
-        return certified, separated.all(axis=1).any(axis=1)
+        refuted: NDArray[np.bool_] = np.logical_or.reduce(np.logical_and.reduce(separated, axis=1), axis=1)
+        return certified, refuted
 
     def _separated(self, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """For pairs (B,): by which of some fixed half-spaces (B, h) a resting start is proved outside S_j."""

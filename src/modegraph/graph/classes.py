@@ -17,6 +17,7 @@ from modegraph.certify.target_class import target_class
 from modegraph.certify.verdict import Status, Verdict, Witness
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box
+from modegraph.model.target import Target
 from modegraph.reach.start import Floats
 
 Key = tuple[str, int]
@@ -125,7 +126,9 @@ class Classes:
             return _resting(link.relation, left, right)
         return _missed(link, gauge)
 
-    def existential(self, i: str, j: str, r_i: Floats | None, r_j: Floats | None, refs: ContinuousReferences) -> Verdict:
+    def existential(
+        self, i: str, j: str, r_i: Floats | None, r_j: Floats | None, refs: ContinuousReferences
+    ) -> Verdict:
         """Whether some pair is certified, every pair refuted, or neither; a reference given is kept."""
         horizon = next(link.horizon for (s, t), link in self.links.items() if s[0] == i and t[0] == j)
         texts = [
@@ -155,7 +158,7 @@ class Classes:
         told = _missed(link, gauge)
         return Verdict(Status.UNDECIDED, f"{told.reason}; closest {where}", margin=told.margin, horizon=link.horizon)
 
-    def entered(self, name: str, mode: Mode, x: Floats) -> ContinuousReferences | None:
+    def entered(self, name: str, mode: Mode | Target, x: Floats) -> ContinuousReferences | None:
         """The references under which a mode may be entered from x (n,), proved; None: none is found."""
         goal = target_class(mode, None, len(x))
         relation = Relation(0, goal, (Part((at_state(x, goal),)),), None)

@@ -128,7 +128,7 @@ class ModeGraph:
 
     def _named(self, name: str, r: Any) -> int | None:
         """Position of the reference r of a mode; None where that leaves several."""
-        if r is None and (name in self._classes.regions or len(self._parameters[name]) > 1):
+        if r is None and self.has_choice(name):
             return None
         return self.indices(name, r)[0]
 
@@ -339,6 +339,10 @@ class ModeGraph:
             return [self._classes.position(name, p)]
         return [mode.match(r)]
 
+    def has_choice(self, name: str) -> bool:
+        """Whether a mode has more than one reference."""
+        return name in self._classes.regions or len(self._parameters[name]) > 1
+
     def parameter(self, node: Node) -> Parameter:
         """The reference of a node."""
         return self._parameters[node[0]][node[1]]
@@ -417,7 +421,7 @@ class ModeGraph:
         return cases
 
 
-def _switch_of(i: str, j: str, references: References, v: Verdict) -> Switch:
+def _switch_of(i: str, j: str, references: References | ContinuousReferences, v: Verdict) -> Switch:
     if v.time is None:
         raise ValueError(f"the certified verdict {i} -> {j} has no time")
     return Switch(i, j, references, v.time, v.energy, v.margin, v.window)

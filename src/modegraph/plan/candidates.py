@@ -37,7 +37,7 @@ def propose(
     """
     centres = _Centres(graph)
     for name, r in ((start, r_start), (goal, r_goal)):
-        if name in graph.regions and r is not None:
+        if name is not None and name in graph.regions and r is not None:
             graph.indices(name, r)
     places = centres.places(start, goal, r_start, r_goal, x0)
     for name, region in graph.regions.items():
