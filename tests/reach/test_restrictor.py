@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import modegraph as mg
+from modegraph.reach.compiled import compile_mode
+from modegraph.reach.flow import Flow, Order
 from tests.soundness.families import follower, oscillator, pushed
 
 LOOP = mg.System(lambda x, u: np.array([x[1], u[0]]), states="x v", inputs="u")
@@ -107,3 +109,18 @@ def test_it_is_drawn_as_a_whole() -> None:
     axes = mg.flowpipe(linear(), horizon=1.0).plot()
     assert axes is not None
     plt.close("all")
+
+
+def test_constraints_are_proved_for_every_reference_of_a_class() -> None:
+    """|x - r| <= .75 holds from starts within .5 of r; with .4 it does not, for any r."""
+    for limit, holds in ((0.75, True), (0.4, False)):
+        mode = linear()
+        mode.constraints = lambda x, r, c=limit: {"near": abs(x[0] - r[0]) <= c}
+        compiled = compile_mode(mode, None)
+        flow = Flow(
+            compiled.fields, compiled.whole(), compiled.w_centre, compiled.w_radius, Order(1, 0),
+            names=compiled.loop.names,
+        )  # fmt: skip
+        assert flow.run(2.0)
+        assert bool(all((step.face_upper <= 0.0).all() for step in flow.steps)) == holds
+        assert (flow.faces_at(0.0, flow.p0, flow.G0, 0) >= 0.5 - limit - 1e-9).all()

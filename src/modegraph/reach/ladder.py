@@ -70,7 +70,7 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
             jacobian -= 1
         rungs.append(Order(degree, jacobian, weights))
     low = disturbed or (done and not is_very_loose(probe))
-    return [rungs[0], rungs[-1]] if low and len(rungs) > 1 else rungs[-1:]
+    return [rungs[0], rungs[-1]] if low and len(rungs) > 1 else rungs[-2:]
 
 
 def _weights(chain: Chain) -> tuple[int, ...]:

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 LOOSE = 5e-3
 """Share of the remainder in the width of the last set above which a higher degree is tried."""
-LOOSE_CLASS = 0.05
+LOOSE_CLASS = 0.07
 """The same for a class of references, where a higher degree costs much more."""
 VERY_LOOSE = 0.25
 """The same share, above which a run of low degree is given up for the next one."""
