@@ -16,7 +16,9 @@ from ..model.mode import Mode
 from ..model.trajectory import at_instant
 from ..reach.chain import Chain, nonlinear_variable
 from ..reach.compiled import CompiledMode, compile_mode
+from ..reach.flow import Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
+from ..reach.ladder import CURVED
 from .crossing import proved_instants
 from .evidence import sampled_violation, slack_until, width_over_time
 from .moments import moments_of
@@ -27,6 +29,7 @@ from .unit import TargetSpec
 from .verdict import Floats, Status, Verdict
 
 MOST_PARTS = 32
+DEEPEST = 7
 PROGRESS = 1.05
 """A cut must carry the constraints this much further, or it is the last one."""
 
@@ -102,19 +105,23 @@ def _legal_chains(
     compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]
 ) -> list[Chain]:
     """Chains that cover all starts, cut where a constraint cannot be proved, as long as that helps."""
-    cutting = Cutting(compiled, end)
+    cutting = Cutting(compiled, end, deadline)
     chains, _ = cutting.run()
     while len(chains) < MOST_PARTS and time.monotonic() < deadline:
         progress(f"{len(chains)} parts")
         worst = min(chains, key=_proved_until)
         until = _proved_until(worst)
-        if until >= min(end, worst.time) or sampled_violation(worst.flows[0]):
+        if until >= min(end, worst.time) or (until >= 0.0 and sampled_violation(worst.flows[0])):
             break
-        halves = worst.piece.split(nonlinear_variable(worst.flows[0]))
-        children = [Chain(compiled, cutting.framed, half, worst.order) for half in halves]
+        if worst.order.degree < CURVED:
+            halves, order = [worst.piece], Order(CURVED, CURVED - 1)
+        else:
+            halves, order = worst.piece.split(nonlinear_variable(worst.flows[0])), worst.order
+        children = [Chain(compiled, cutting.framed, half, order, deadline) for half in halves]
         for child in children:
             child.run(end)
-        if min(map(_proved_until, children), default=np.inf) <= PROGRESS * max(until, 0.0):
+        further = min(map(_proved_until, children), default=np.inf) > PROGRESS * until
+        if (until >= 0.0 and not further and len(halves) > 1) or worst.piece.depth >= DEEPEST:
             break
         chains = [chain for chain in chains if chain is not worst] + children
     return chains

@@ -198,7 +198,11 @@ class Flow:
             return np.zeros(0)
         inputs, radius = self.variables_at(t, p, G, fld)
         value, off, _ = self.evaluate(fld.observed, inputs, radius)
-        return np.asarray(self.bounds.upper(value[: len(fld.faces)]) + off[: len(fld.faces)])
+        faces = value[: len(fld.faces)]
+        upper = self.bounds.upper(faces)
+        for i in np.flatnonzero((upper + off[: len(faces)] > 0.0) & np.isfinite(off[: len(faces)])):
+            upper[i] = min(upper[i], self.bounds.refined_upper(faces[i], -float(off[i])))
+        return np.asarray(upper + off[: len(faces)])
 
     # -- stepping --------------------------------------------------------------------------------
 

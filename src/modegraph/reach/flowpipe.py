@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -271,8 +272,8 @@ class _Part:
 class Cutting:
     """Pieces of the start set, cut where the flowpipe ends first, as long as that gets further."""
 
-    def __init__(self, compiled: CompiledMode, end: float) -> None:
-        self.compiled, self.end = compiled, end
+    def __init__(self, compiled: CompiledMode, end: float, deadline: float = math.inf) -> None:
+        self.compiled, self.end, self.deadline = compiled, end, deadline
         self.framed: Sequence[Field] = compiled.framed_fields()
         self.disturbed = bool(compiled.w_radius.any())
 
@@ -288,7 +289,7 @@ class Cutting:
         while not stuck and any(part.chain.failure for part in parts):
             worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
             piece = worst.chain.piece
-            if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+            if time.monotonic() > self.deadline or len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
                 stuck = "; no more are tried"
                 break
             children = self._halves(worst, ladder)
@@ -307,7 +308,7 @@ class Cutting:
 
     def _tighter(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
         """Pieces of a class of references, the loosest cut as long as they are very loose and that helps."""
-        while len(parts) < MOST_LOOSE_PIECES:
+        while len(parts) < MOST_LOOSE_PIECES and time.monotonic() < self.deadline:
             loosest = max(parts, key=lambda part: looseness(part.chain))
             if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
                 break
@@ -323,9 +324,11 @@ class Cutting:
         best: _Part | None = None
         given_up: _Part | None = None
         for rung in range(first, top + 1):
+            if best is not None and time.monotonic() > self.deadline:
+                break
             if best is not None and not light[rung] and (best.chain.failure or not is_very_loose(best.chain)):
                 break
-            chain = Chain(self.compiled, self.framed, piece, ladder[rung])
+            chain = Chain(self.compiled, self.framed, piece, ladder[rung], self.deadline)
             impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
             done = chain.run(self.end, is_very_loose if impatient else None)
             if done and chain.time < self.end:

@@ -27,10 +27,17 @@ STRAIGHT = 0.2
 """A variable counts twice where its nonlinear terms are smaller than this, relative to the geometric mean."""
 
 
+CURVED = 4
+"""Degree of a linear loop with curved constraints."""
+
+
 def orders(compiled: CompiledMode, variables: int) -> list[Order]:
     """Degrees to try for a piece with so many variables, lowest first. Where all is linear, degree 1 is enough."""
-    if compiled.flat or variables == 0:
+    if variables == 0:
         return [Order(1, 0)]
+    if compiled.flat:
+        # What must be defined, and the constraints, may be curved all the same.
+        return [Order(1, 0), Order(CURVED, CURVED - 1)]
     found: list[Order] = []
     for degree, jacobian in LADDER:
         if found and degree > MOST_DISTURBED and compiled.w_radius.any():
@@ -54,7 +61,7 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
     A run of low degree shows in which variables the flow is nearly straight: those count twice.
     """
     found = orders(compiled, piece.variables)
-    if len(found) == 1:
+    if compiled.flat or len(found) == 1:
         return found
     probe = Chain(compiled, compiled.fields, piece, found[0])
     disturbed = bool(compiled.w_radius.any())
