@@ -289,7 +289,8 @@ class Cutting:
         while not stuck and any(part.chain.failure for part in parts):
             worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
             piece = worst.chain.piece
-            if time.monotonic() > self.deadline or len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+            ended = time.monotonic() > self.deadline or len(parts) >= MOST_PIECES
+            if ended or piece.depth >= DEEPEST_CUT or piece.variables == 0:
                 stuck = "; no more are tried"
                 break
             children = self._halves(worst, ladder)
