@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from ..enclosure.monomials import monomials
 from ..enclosure.rounding import TINY, UNIT
-from ..expression.evaluate import Evaluator
 from .bounds import PolynomialBounds
 from .decay import DecayRegion, Norm, SettledLoop
+from .float_loop import FloatLoop
 from .lyapunov import shrinking_ellipsoid
 from .pointwise import evaluate_over
 from .start import Chart, Piece
@@ -184,47 +184,9 @@ class FunnelBuilder:
 
     def __init__(self, loop: SettledLoop) -> None:
         self.loop = loop
-        self._slope = Evaluator(loop.fld.jacobian)
-        self._rates = Evaluator(loop.fld.rates)
+        self._floats = FloatLoop(loop.fld, loop.w_centre, loop.w_radius, loop.unknown_lo, loop.unknown_hi)
 
     # -- floats: proposals -----------------------------------------------------------------------
-
-    def _inputs(self, x: Floats, spread: bool) -> Floats:
-        """Tape variables (nv, K) at points x (K, n); disturbance and unknowns at random corners, or central."""
-        loop, fld = self.loop, self.loop.fld
-        rng = np.random.default_rng(3)
-        out = np.zeros((fld.variables, len(x)))
-        out[: fld.states] = x.T
-        out[fld.time_index] = fld.start
-        middle = np.concatenate([loop.w_centre, 0.5 * (loop.unknown_lo + loop.unknown_hi)])
-        radius = np.concatenate([loop.w_radius, 0.5 * (loop.unknown_hi - loop.unknown_lo)])
-        sign = np.sign(rng.uniform(-1.0, 1.0, (len(radius), len(x)))) * spread
-        out[fld.first_w :] = middle[:, None] + radius[:, None] * sign
-        return out
-
-    def _jacobians(self, x: Floats, spread: bool = True) -> Floats:
-        n = self.loop.fld.states
-        J = self._slope(self._inputs(x, spread))[: n * n].T.reshape(-1, n, n)
-        return np.asarray(J[np.isfinite(J).all(axis=(1, 2))])
-
-    def equilibrium(self, x: Floats) -> Floats | None:
-        """Newton's method from x (any centre is sound)."""
-        x = x.copy()
-        for _ in range(12):
-            rate = self._rates(self._inputs(x[None], False))[:, 0]
-            J = self._jacobians(x[None], False)
-            if not (len(J) and np.isfinite(rate).all()):
-                return None
-            step = np.linalg.lstsq(J[0], -rate, rcond=1e-12)[0]
-            x += step
-            if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + np.abs(x).max(initial=0.0)):
-                break
-        return x if np.isfinite(x).all() else None
-
-    def decay_rate(self, centre: Floats) -> float:
-        """Rate of the slowest mode, 1/s (floats)."""
-        J = self._jacobians(centre[None], False)
-        return -float(np.linalg.eigvals(J[0]).real.max()) if len(J) else -1.0
 
     def _propose(
         self, centre: Floats, push: Floats, scale: Floats, alpha: float,
@@ -240,7 +202,8 @@ class FunnelBuilder:
             inner = axes * 1.001 / scale[:, None]
             inside = np.asarray(np.linalg.inv(inner @ inner.T), float)
             at = centre + np.vstack([axes.T, -axes.T])
-        slopes = self._jacobians(np.vstack([centre, at[:: max(1, len(at) // 12)]])) / scale[None, :, None] * scale
+        sampled = self._floats.jacobians(np.vstack([centre, at[:: max(1, len(at) // 12)]]))
+        slopes = sampled / scale[None, :, None] * scale
         for k in range(ROUNDS):
             P = shrinking_ellipsoid(slopes, g, alpha, KEPT, y, inside, weight)
             if P is None:
@@ -250,7 +213,7 @@ class FunnelBuilder:
             rng = np.random.default_rng(k)
             s = rng.normal(size=(SAMPLES, n))
             s /= np.linalg.norm(s, axis=1)[:, None]
-            full = self._jacobians(centre + (s @ back) * scale) / scale[None, :, None] * scale
+            full = self._floats.jacobians(centre + (s @ back) * scale) / scale[None, :, None] * scale
             Z = L.T @ full @ back.T
             gz = g @ L
             m = np.linalg.norm(gz, axis=1) + 1e-300
@@ -268,10 +231,13 @@ class FunnelBuilder:
 
         ``fit``: half-widths (n,) whose proportions the ellipsoids are to have.
         """
-        centre = self.equilibrium(points.mean(axis=0))
+        centre = self._floats.equilibrium(points.mean(axis=0), range(self.loop.fld.states))
         if centre is None:
             return NoFunnel("no equilibrium was found near the end of the flowpipe")
-        rate = self.decay_rate(centre)
+        slope = self._floats.jacobian(centre)
+        if not np.isfinite(slope).all():
+            return NoFunnel("the Jacobian at the equilibrium is not finite")
+        rate = -float(np.linalg.eigvals(slope).real.max())
         if not rate > 1e-6:
             return NoFunnel(
                 f"the loop does not settle: its slowest mode has the rate {-rate:.3g} 1/s, so nothing can be said "
