@@ -49,7 +49,7 @@ STRIDES = (0.6, 0.75, 0.88, 0.94)
 
 
 @dataclass(frozen=True)
-class Sublevel:
+class NormBall:
     """{rho <= radius} as a set the engine can bound: p(xi) = centre + radius A xi over the unit ball."""
 
     norm: Norm
@@ -163,12 +163,12 @@ class Funnel:
         return float(first.norm.quadric.gauges(bounds, p[None], [G])[0]) / first.radius
 
     @property
-    def end(self) -> Sublevel:
+    def end(self) -> NormBall:
         """Where everything is in the end."""
-        return self.sublevel(len(self.rungs) - 1, self.rungs[-1].lower)
+        return self.ball(len(self.rungs) - 1, self.rungs[-1].lower)
 
-    def sublevel(self, k: int, radius: float) -> Sublevel:
-        return Sublevel(self.rungs[k].norm, radius, self.loop)
+    def ball(self, k: int, radius: float) -> NormBall:
+        return NormBall(self.rungs[k].norm, radius, self.loop)
 
 
 @dataclass(frozen=True)
@@ -190,9 +190,9 @@ class FunnelBuilder:
 
     def _propose(
         self, centre: Floats, push: Floats, scale: Floats, alpha: float,
-        points: Floats, around: Sublevel | None, weight: Floats,
+        points: Floats, around: NormBall | None, weight: Floats,
     ) -> Floats | None:  # fmt: skip
-        """Axes (n, n) of an ellipsoid around the points and around a sublevel set."""
+        """Axes (n, n) of an ellipsoid around the points and around a ball of an earlier norm."""
         n = len(scale)
         y, g = points / scale, push / scale
         at = centre + points
@@ -226,7 +226,7 @@ class FunnelBuilder:
 
     # -- intervals: proofs -----------------------------------------------------------------------
 
-    def build(self, points: Floats, fit: Floats, enough: Callable[[Sublevel], bool]) -> Funnel | NoFunnel:
+    def build(self, points: Floats, fit: Floats, enough: Callable[[NormBall], bool]) -> Funnel | NoFunnel:
         """A funnel whose mouth holds (about) the points (K, n), narrow enough at its end if that can be proved.
 
         ``fit``: half-widths (n,) whose proportions the ellipsoids are to have.
@@ -252,7 +252,7 @@ class FunnelBuilder:
         scale = np.abs(y).max(axis=0)
         scale = np.maximum(scale, 1e-3 * scale.max(initial=1e-12))
         rungs: list[Rung] = []
-        last: Sublevel | None = None
+        last: NormBall | None = None
         for _ in range(STAGES):
             weight = np.diag((scale / (scale if last is None else fit)) ** 2)
             added = self._stage(centre, push, box, scale, rate, y, last, weight / weight.max(), enough)
@@ -261,7 +261,7 @@ class FunnelBuilder:
             rungs += added
             narrowed = added[-1].lower / added[0].radius
             scale = scale * narrowed
-            last = Sublevel(added[-1].norm, added[-1].lower, self.loop)
+            last = NormBall(added[-1].norm, added[-1].lower, self.loop)
             if narrowed > NARROWED or enough(last):
                 break
         if not rungs:
@@ -272,7 +272,7 @@ class FunnelBuilder:
 
     def _stage(
         self, centre: Floats, push: Floats, box: Floats, scale: Floats, rate: float, points: Floats,
-        last: Sublevel | None, weight: Floats, enough: Callable[[Sublevel], bool],
+        last: NormBall | None, weight: Floats, enough: Callable[[NormBall], bool],
     ) -> list[Rung]:  # fmt: skip
         """Rungs in the most eager norm that can be proved, around the points or inside what was reached last."""
         for eager in EAGER if last is not None else EAGER[2:]:
@@ -293,7 +293,7 @@ class FunnelBuilder:
         return []
 
     def _descend(
-        self, norm: Norm, radius: float, push: Floats, box: Floats, enough: Callable[[Sublevel], bool]
+        self, norm: Norm, radius: float, push: Floats, box: Floats, enough: Callable[[NormBall], bool]
     ) -> list[Rung]:
         """Rungs in one norm from a radius down as far as it shrinks."""
         n = len(norm.centre)
@@ -311,10 +311,10 @@ class FunnelBuilder:
             if chosen is None:
                 return rungs
             alpha, mu, lower = chosen
-            upper, power, tracking = Sublevel(norm, radius, self.loop).observed()
+            upper, power, tracking = NormBall(norm, radius, self.loop).observed()
             rungs.append(Rung(norm, radius, lower, alpha, mu, upper, power, tracking))
             radius = lower
-            if len(rungs) >= MOST_RUNGS or enough(Sublevel(norm, radius, self.loop)):
+            if len(rungs) >= MOST_RUNGS or enough(NormBall(norm, radius, self.loop)):
                 return rungs
 
     def _step_down(
