@@ -201,11 +201,12 @@ class Exploration:
         flow = found.flow
         assert flow is not None
         variable = nonlinear_variable(flow) if cut_short else widest_variable(flow.bounds, flow.set_at(0)[0])
+        # No halves: the piece is proved to hold no start, though only now that it is cut.
         pieces = piece.split(variable)
         children: list[Findings] = []
         for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
             children.append(part)
-            if piece.chart.sublevel is None and not better(part, found, again, check_again):
+            if piece.chart.sublevel is None and not part.empty and not better(part, found, again, check_again):
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
                 return found
         return merge(found, children, again, check_again)
