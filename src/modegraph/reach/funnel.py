@@ -8,9 +8,10 @@ within log((a - mu/alpha) / (b - mu/alpha)) / alpha seconds, and stays below.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import dropwhile, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +118,11 @@ class Rung:
     tracking: Floats
 
     @property
+    def legal(self) -> bool:
+        """Whether the constraints are proved on it, and a bound of the inputs."""
+        return bool((self.face_upper <= 0.0).all() and np.isfinite(self.power))
+
+    @property
     def floor(self) -> float:
         """Upper bound of mu / alpha, the value V sinks to."""
         return self.mu / self.alpha * (1.0 + 4.0 * UNIT)
@@ -134,6 +140,15 @@ class Rung:
         """Upper bound of rho after some seconds, from rho <= a."""
         left = math.exp(-self.alpha * seconds * (1.0 - 1e-9)) * (1.0 + 1e-9)
         return min(a, math.sqrt((self.floor + max(0.0, a * a - self.floor * (1.0 - 1e-9)) * left) * (1.0 + 1e-9)))
+
+
+def usable(rungs: Sequence[Rung]) -> tuple[Rung, ...]:
+    """The first legal rungs without a gap: a rung in a new norm may reach beyond the one before.
+
+    What enters before a gap passes it; what might enter behind it is given up.
+    """
+    begun = dropwhile(lambda rung: not rung.legal, rungs)
+    return tuple(takewhile(lambda rung: rung.legal, begun))
 
 
 @dataclass(frozen=True)
@@ -266,9 +281,12 @@ class FunnelBuilder:
                 break
         if not rungs:
             return NoFunnel("no ellipsoid around the reach set is proved to shrink")
-        while rungs and not (rungs[0].face_upper <= 0.0).all():
-            rungs.pop(0)
-        return Funnel(self.loop, tuple(rungs)) if rungs else NoFunnel("a constraint fails in the invariant set")
+        kept = usable(rungs)
+        return (
+            Funnel(self.loop, kept)
+            if kept
+            else NoFunnel("a constraint, or a bound of the inputs, fails in the invariant set")
+        )
 
     def _stage(
         self, centre: Floats, push: Floats, box: Floats, scale: Floats, rate: float, points: Floats,
