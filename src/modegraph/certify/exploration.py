@@ -370,20 +370,22 @@ class Exploration:
         """
         flow = flows[-1]
         found = Findings(flow=flows[0], last=flow, tail_reason=tail_reason)
-        proved = proved_instants(flow)
+        # The first flow that is not proved to its end, if there is one.
+        short = next((f for f in flows if proved_instants(f) < len(f.steps)), flow)
+        proved = proved_instants(short)
         if flow.failure is not None:
             found.failure = str(flow.failure)
-        if proved < len(flow.steps):
-            found.unproved = self._unproved(flow, proved)
+        if proved < len(short.steps):
+            found.unproved = self._unproved(short, proved)
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)
-        found.safe_until = float(flow.times[proved]) if proved >= 0 else float(flow.times[0])
+        found.safe_until = float(short.times[proved]) if proved >= 0 else float(short.times[0])
         for j in wanted:
             outcome = self._crossing(flows, j, tail if isinstance(tail, Sinking) else None, before)
             if isinstance(outcome, Missed):
                 found.missed[j] = outcome
             else:
                 found.proofs[j] = outcome
-        if safety and proved == len(flow.steps) and flow.failure is None:
+        if safety and proved == len(short.steps) and flow.failure is None:
             found.safety = self._safety(flows, tail.tail() if isinstance(tail, Sinking) else tail, before)
         return found
 
@@ -423,7 +425,8 @@ class Exploration:
             slack.append(slack_until(flow, len(flow.steps)))
         assert best is not None
         last = flows[-1]
-        if sinking is None or goal.reset is not None or proved_instants(last) < len(last.steps):
+        # The search goes on by the bounds of whole steps: starts and breakpoints may lack a proof in any flow.
+        if sinking is None or goal.reset is not None or any(proved_instants(f) < len(f.steps) for f in flows):
             return best
         arrival = sinking.arrival(goal.region, self._end())
         if isinstance(arrival, Missed):
