@@ -1,4 +1,4 @@
-"""Chains of flows: nothing is claimed of a later flow that is not proved of those before it."""
+"""Chains of flows: what they prove together, and what is said where they do not."""
 
 from __future__ import annotations
 
@@ -72,3 +72,15 @@ def test_all_time_is_proved_only_behind_flows_that_are_proved(top: float, proved
     assert (found.safety is not None) == proved
     assert bool(found.unproved) != proved
     assert proved or found.safe_until < 0.5
+
+
+@pytest.mark.parametrize("rate, both", [(1e-7, True), (0.0, False)])
+def test_why_there_is_no_funnel_is_said_once(rate: float, both: bool) -> None:
+    # A rate of 1e-7 is enough to look for an invariant set, not for a funnel; a rate of 0 for neither.
+    plant = mg.System(lambda x: np.array([-rate * x[0] - x[0] ** 3]), states=1, inputs="none")
+    slow = mg.Mode(
+        "slow", plant, controller=lambda x: 0.0, reference=mg.setpoint([0.0]), start=mg.Box([-0.05], [0.05])
+    )  # fmt: skip
+    reason = mg.build([slow], budget=20.0).check("slow").reason
+    assert reason.count("the loop does not settle") == 1
+    assert ("no funnel either: the loop does not settle" in reason) == both

@@ -17,6 +17,7 @@ from ..reach.decay import SettledLoop
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
 from ..reach.framing import generator_box
+from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
 from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
@@ -288,15 +289,18 @@ class Exploration:
                     tail, decay = outcome, outcome.decay
                 else:
                     reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
-                    if not pending:
-                        tail = self._sink(flow, pending)
-                        decay = tail.tail().decay if tail is not None else np.inf
+                    sunk = self._sink(flow, pending) if not pending else None
+                    if isinstance(sunk, Sinking):
+                        tail, decay = sunk, sunk.tail().decay
+                    elif sunk is not None and sunk.reason.partition(":")[0] not in reason:
+                        # Not the same again with other numbers.
+                        reason = f"{reason}; no funnel either: {sunk.reason}"
             if not pending and (tail is not None or not safety):
                 break
             settled = tail is not None and np.isfinite(decay) and flow.time > tail.start + SETTLING / decay
             if settled and all(now[j] > 0.98 * previous[j] for j in pending):
                 sinking = self._sink(flow, pending)
-                if sinking is not None and any(self._arrives(sinking, j) for j in pending):
+                if isinstance(sinking, Sinking) and any(self._arrives(sinking, j) for j in pending):
                     tail = sinking
                     break
                 if flow.frame is not None or self.framed[0].frame is None:
@@ -328,13 +332,12 @@ class Exploration:
         flow.next_restart = len(flow.steps) + RESTART_STEPS
         return None
 
-    def _sink(self, flow: Flow, pending: Sequence[int]) -> Sinking | None:
-        """A funnel that holds the end of a flow and leads into the pending targets if possible."""
+    def _sink(self, flow: Flow, pending: Sequence[int]) -> Sinking | NoFunnel | None:
+        """A funnel that holds the end of a flow and leads into the pending targets if possible; None: not tried."""
         funnels = self.funnels(flow.piece)
         if funnels is None or self.linear:
             return None
-        found = funnels.enter(flow, [self.goals[j].region for j in pending if self.goals[j].reset is None])
-        return found if isinstance(found, Sinking) else None
+        return funnels.enter(flow, [self.goals[j].region for j in pending if self.goals[j].reset is None])
 
     def _arrives(self, sinking: Sinking, j: int) -> bool:
         goal = self.goals[j]

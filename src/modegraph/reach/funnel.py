@@ -188,10 +188,9 @@ class Funnel:
 
 @dataclass(frozen=True)
 class NoFunnel:
-    """Why there is no funnel; ``final``: nowhere in this loop."""
+    """Why there is no funnel."""
 
     reason: str
-    final: bool = False
 
 
 class FunnelBuilder:
@@ -256,8 +255,7 @@ class FunnelBuilder:
         if not rate > 1e-6:
             return NoFunnel(
                 f"the loop does not settle: its slowest mode has the rate {-rate:.3g} 1/s, so nothing can be said "
-                "for all time",
-                final=True,
+                "for all time"
             )
         found = self.loop.push(centre)
         if found is None:
@@ -285,7 +283,7 @@ class FunnelBuilder:
         return (
             Funnel(self.loop, kept)
             if kept
-            else NoFunnel("a constraint, or a bound of the inputs, fails in the invariant set")
+            else NoFunnel("a constraint, or a bound of the inputs, fails in the ellipsoids that shrink")
         )
 
     def _stage(
