@@ -285,6 +285,13 @@ FAULTS = (
         ("tests/certify/test_region.py",),
     ),
     Fault(
+        "a box counts as proved once its search has run out of cells",
+        "model/sets/level_search.py",
+        "        if examined > most or refuted(",
+        "        if examined > most:\n            return True\n        if refuted(",
+        ("tests/model/sets/test_level_search.py",),
+    ),
+    Fault(
         "separation is decided without allowance for rounding",
         "certify/region.py",
         "(least - slack > up)",
