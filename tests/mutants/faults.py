@@ -285,6 +285,13 @@ FAULTS = (
         ("tests/certify/test_region.py",),
     ),
     Fault(
+        "a box counts as proved once its search has run out of cells",
+        "model/sets/level_search.py",
+        "        if examined > most or refuted(",
+        "        if examined > most:\n            return True\n        if refuted(",
+        ("tests/model/sets/test_level_search.py",),
+    ),
+    Fault(
         "separation is decided without allowance for rounding",
         "certify/region.py",
         "(least - slack > up)",
@@ -327,11 +334,25 @@ FAULTS = (
         ("tests/certify/test_proof.py",),
     ),
     Fault(
+        "a part that is not decided counts as one without starts",
+        "certify/findings.py",
+        "if not part.empty]",
+        "if part.proofs or part.waiting]",
+        ("tests/certify/test_findings.py",),
+    ),
+    Fault(
         "a parallelotope is put around the polynomial only",
         "reach/parallelotope.py",
         "reach = np.maximum(bounds.upper(q), bounds.upper(-q)) + spread",
         "reach = np.maximum(bounds.upper(q), bounds.upper(-q))",
         ("tests/reach/test_parallelotope.py",),
+    ),
+    Fault(
+        "an approximate inverse is measured without allowance for rounding",
+        "reach/inverse.py",
+        " + 2.0 * (n + 2) * UNIT * (np.abs(N) @ np.abs(axes))",
+        "",
+        ("tests/reach/test_inverse.py",),
     ),
     Fault(
         "a funnel goes on after its time is up",
@@ -341,11 +362,25 @@ FAULTS = (
         ("tests/certify/test_sinking.py",),
     ),
     Fault(
+        "a funnel proves a switch behind flows that are not proved",
+        "certify/exploration.py",
+        " or any(proved_instants(f) < len(f.steps) for f in flows):",
+        ":",
+        ("tests/certify/test_exploration.py",),
+    ),
+    Fault(
         "a rung forgets what the disturbance holds",
         "reach/funnel.py",
         "return self.mu / self.alpha * (1.0 + 4.0 * UNIT)",
         "return 0.0",
         ("tests/reach/test_funnel.py", "tests/certify/test_sinking.py"),
+    ),
+    Fault(
+        "a funnel goes on behind a rung that breaks a constraint",
+        "reach/funnel.py",
+        "return tuple(takewhile(lambda rung: rung.legal, begun))",
+        "return tuple(begun)",
+        ("tests/reach/test_funnel.py",),
     ),
     Fault(
         "a decay is proved at the centres of cells only",

@@ -302,6 +302,7 @@ class _Cutting:
                 if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
                     stuck = "; cutting it gets no further"
                     break
+                # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
                 parts = [part for part in parts if part is not worst] + children
         return [part.chain for part in parts], stuck
 
