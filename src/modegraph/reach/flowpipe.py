@@ -36,8 +36,10 @@ MOST_DISTURBED = 6
 """Highest degree with a disturbance: there the remainder is what the disturbance adds."""
 LOOSE = 5e-3
 """Share of the remainder in the width of the last set above which a higher degree is tried."""
+GIVE_UP = 0.02
+"""The same share, above which a run of low degree is given up for the next one: it seldom falls again."""
 VERY_LOOSE = 0.25
-"""The same share, above which a run of low degree is given up for the next one."""
+"""The same share, above which even a degree with many monomials is tried."""
 MOST_PIECES = 32
 DEEPEST_CUT = 7
 PROGRESS = 1.05
@@ -316,7 +318,7 @@ class _Cutting:
                 break
             chain = Chain(self.compiled, self.framed, piece, ladder[rung])
             impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
-            done = chain.run(self.end, _very_loose if impatient else None)
+            done = chain.run(self.end, _to_give_up if impatient else None)
             if done and chain.time < self.end:
                 given_up = _Part(chain, rung, top)
                 continue
@@ -355,3 +357,4 @@ def _loose(chain: Chain, share: float = LOOSE) -> bool:
 
 
 _very_loose = partial(_loose, share=VERY_LOOSE)
+_to_give_up = partial(_loose, share=GIVE_UP)
