@@ -11,6 +11,10 @@ def test_results_come_in_order() -> None:
     assert list(cores.in_parallel([lambda k=k: k * k for k in range(6)])) == [k * k for k in range(6)]
 
 
+def test_no_tasks_have_no_results() -> None:
+    assert list(cores.in_parallel([])) == []
+
+
 def test_tasks_run_together_where_a_core_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cores, "_FREE", threading.BoundedSemaphore(1))
     met = threading.Barrier(2, timeout=20.0)

@@ -27,9 +27,9 @@ def in_parallel(tasks: Sequence[Callable[[], Result]]) -> Iterator[Result]:
 
     A caller that stops early lets what has begun come to its end.
     """
-    started: list[Future[Result] | None] = [None]
-    for task in tasks[1:]:
-        started.append(_start(task) if _FREE.acquire(blocking=False) else None)
+    started: list[Future[Result] | None] = []
+    for k, task in enumerate(tasks):
+        started.append(_start(task) if k and _FREE.acquire(blocking=False) else None)
     for task, future in zip(tasks, started, strict=True):
         yield task() if future is None else future.result()
 

@@ -11,6 +11,7 @@ from flint import arb, ctx, fmpq
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from modegraph.enclosure.adjoint import tighten
 from modegraph.enclosure.jets import PLAIN, TOO_WIDE, solve_in_time
 from modegraph.enclosure.monomials import monomials
 from modegraph.enclosure.remainder import coefficient_norms, image, remainders, wants_another_try
@@ -75,7 +76,7 @@ def programs(draw: Any) -> Program:
 
 
 def stored(made: Program, start: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """P, R and kinks for variables with the coefficients ``start`` (2, K+1, N)."""
+    """P, R (the lesser of both bounds) and kinks for variables with the coefficients ``start`` (2, K+1, N)."""
     rows = np.array(made.rows, np.int64)
     count = len(rows)
     const = np.array(made.const)
@@ -92,9 +93,12 @@ def stored(made: Program, start: np.ndarray, radius: np.ndarray) -> tuple[np.nda
         solve_in_time(rows, const, kinks, ranges, outputs, variables, 0, P, dg, 1.0, K, CUT, *TABLE.arrays)
         coefficient_norms(P, dg, norms, TABLE.start)
         nothing = np.zeros(count)
-        remainders(rows, const, nothing, kinks, ranges, P, dg, norms, R, K, CUT, TABLE.pairs, *TABLE.arrays)
+        _, A, local = remainders(
+            rows, const, nothing, kinks, ranges, P, dg, norms, R, K, CUT, TABLE.pairs, *TABLE.arrays
+        )
         if not wants_another_try(rows, kinks, ranges):
             break
+    tighten(rows, const, nothing, kinks, np.arange(count), P, R, A, local)
     return P, R, kinks
 
 
@@ -255,3 +259,28 @@ def test_a_large_factor_of_a_small_value_costs_only_relative_rounding() -> None:
     start[0, 0, 0] = 1e-16
     P, R, _ = stored(made, start, np.zeros(2))
     assert R[-1] <= 1e-15 * abs(P[-1, 0, 0])
+
+
+def far_input(made: Program, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """P, R of a program whose first variable is 1 up to a radius, with nothing truncated."""
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, 0, 0] = 1.0
+    P, R, _ = stored(made, start, np.array([radius, 0.0]))
+    check(made, start, np.array([radius, 0.0]), EXTREMES)
+    return P, R
+
+
+@pytest.mark.parametrize("op", [ops.SQR, ops.EXP, ops.RECIP, ops.SIN])
+def test_sensitivities_hold_over_the_whole_range(op: int) -> None:
+    """A wide input: the slope at the centre is far from the largest one."""
+    made = Program()
+    made.apply(op, 0, 0, 0, 0.0)
+    far_input(made, 0.5)
+
+
+def test_terms_that_cancel_do_not_add_up() -> None:
+    """3 x - 2 x: forward 5 times the radius of x, by adjoints once."""
+    made = Program()
+    made.add(ops.SUB, made.add(ops.MULC, 0, const=3.0), made.add(ops.MULC, 0, const=2.0))
+    _, R = far_input(made, 0.5)
+    assert 0.5 <= R[-1] <= 0.5 * (1.0 + 1e-9)

@@ -10,7 +10,7 @@ from modegraph.reach.compiled import compile_mode
 from modegraph.reach.decay import DecayRegion, Norm, SettledLoop
 
 
-def settled(field: Any, n: int, w: mg.Box | None = None, unknowns: Any = None) -> SettledLoop:
+def settled(field: Any, n: int, w: mg.Box | None = None, unknowns: Any = None, constraints: Any = None) -> SettledLoop:
     plant = mg.System(field, states=n, inputs="none", disturbance=w, unknowns=unknowns)
     mode = mg.Mode(
         "m",
@@ -18,6 +18,7 @@ def settled(field: Any, n: int, w: mg.Box | None = None, unknowns: Any = None) -
         controller=lambda x: 0.0,
         reference=mg.setpoint([0.0]),
         start=mg.Ball(np.zeros(n), 0.1),
+        constraints=constraints,
     )
     c = compile_mode(mode, mode.reference.parameters()[0])
     d = np.array(list(c.unknowns.values()), float).reshape(-1, 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.reach.funnel import Funnel, FunnelBuilder, NoFunnel, Rung
+from modegraph.reach.funnel import Funnel, FunnelBuilder, NoFunnel, Rung, usable
 from tests.reach.test_decay import round_norm, settled
 
 
@@ -20,9 +20,8 @@ def build(loop: Any, points: Any, **kwargs: Any) -> Funnel | NoFunnel:
     return FunnelBuilder(loop).build(points, np.abs(points).max(axis=0), enough)
 
 
-def rung(alpha: float = 1.0, mu: float = 0.01) -> Rung:
-    nothing = np.zeros(0)
-    return Rung(round_norm(1), 1.0, 0.5, alpha, mu, nothing, 0.0, nothing)
+def rung(alpha: float = 1.0, mu: float = 0.01, faces: Any = (), power: float = 0.0) -> Rung:
+    return Rung(round_norm(1), 1.0, 0.5, alpha, mu, np.array(faces, float), power, np.zeros(0))
 
 
 def test_times_of_a_rung_are_those_of_the_comparison_equation() -> None:
@@ -79,6 +78,46 @@ def test_the_floor_is_no_lower_than_what_the_disturbance_can_hold() -> None:
     assert hi[0] > 0.1
     assert lo[0] < -0.1
     assert hi[0] < 0.2
+
+
+GOOD, BAD, UNBOUNDED = rung(faces=(-1.0, 0.0)), rung(faces=(-1.0, 1e-9)), rung(power=np.inf)
+UNDEFINED = rung(faces=(np.nan,))
+
+
+@pytest.mark.parametrize(
+    "rungs, kept",
+    [
+        ([GOOD, GOOD], slice(0, 2)),
+        ([BAD, UNBOUNDED, UNDEFINED, GOOD, GOOD], slice(3, 5)),
+        ([GOOD, BAD, GOOD], slice(0, 1)),
+        ([UNBOUNDED, GOOD, GOOD, UNDEFINED, GOOD], slice(1, 3)),
+        ([BAD, UNBOUNDED], slice(0, 0)),
+        ([], slice(0, 0)),
+    ],
+)
+def test_a_funnel_ends_before_a_rung_that_breaks_a_constraint(rungs: list[Rung], kept: slice) -> None:
+    found = usable(rungs)
+    assert len(found) == len(rungs[kept])
+    assert all(a is b for a, b in zip(found, rungs[kept], strict=True))
+
+
+def test_a_later_norm_may_reach_further_than_the_one_before() -> None:
+    A = np.array([[-2.0, 3.5], [0.1, -0.7]])
+
+    def built(constraints: Any) -> Funnel:
+        loop = settled(lambda x, w: A @ x + np.array([w[0], 0.0]), 2, mg.Box([-0.02], [0.02]), None, constraints)
+        funnel = build(loop, ring(2, 0.5))
+        assert isinstance(funnel, Funnel)
+        return funnel
+
+    free = built(None)
+    tops = [float(free.ball(k, r.radius).box()[1][0]) for k, r in enumerate(free.rungs)]
+    gap = next(k for k in range(1, len(tops)) if tops[k] > 1.01 * min(tops[:k]))
+    limit = 1.005 * tops[gap - 1]
+    first = next(k for k, top in enumerate(tops) if top < limit)
+    bound = built(lambda x: {"side": x[0] <= limit})
+    assert len(bound.rungs) == gap - first
+    assert all((r.face_upper <= 0.0).all() for r in bound.rungs)
 
 
 def test_enough_ends_the_search() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.verdict import Status
+from modegraph.reach import flowpipe
 from modegraph.reach.start import Piece, whole
 
 SETS = {
@@ -126,3 +127,50 @@ def test_an_edge_between_two_modes_with_sublevel_starts() -> None:
     assert graph.verdict("brisk", "gentle").time == (0.0, 0.0)
     run = graph.plan("gentle", "brisk").simulate([0.6, 0.1])
     assert run.ok
+
+
+@pytest.fixture
+def late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only boxes narrower than 1/2 are seen to be empty: a piece may turn out to hold no start when it is cut."""
+    known = mg.Sublevel.hull_within
+
+    def hull(self: mg.Sublevel, lo: np.ndarray, hi: np.ndarray) -> Any:
+        return (lo, hi) if (hi - lo).max() > 0.5 else known(self, lo, hi)
+
+    monkeypatch.setattr(mg.Sublevel, "hull_within", hull)
+
+
+def lobes(field: Any, fn: Any, n: int, **more: Any) -> mg.Mode:
+    plant = mg.System(field, states=n, inputs=0)
+    return mg.Mode(
+        "lobes", plant, controller=lambda x: np.zeros(0), reference=mg.setpoint([0.0]),
+        start=mg.Sublevel(fn, 0.04), **more,
+    )  # fmt: skip
+
+
+@pytest.mark.usefixtures("late")
+@pytest.mark.parametrize("least, certified", [(0.7, True), (0.82, False)])
+def test_a_piece_that_turns_out_empty_is_no_obstacle_to_a_proof(least: float, certified: bool) -> None:
+    # Starts have x^2 >= .8; the pieces between the lobes do not.
+    mode = lobes(
+        lambda x: np.array([-0.01 * x[0]]), lambda x: (x[0] ** 2 - 1.0) ** 2, 1,
+        constraints=lambda x: {"hollow": x[0] ** 2 >= least},
+    )  # fmt: skip
+    graph = mg.build([mode, mg.Target("all", mg.Box([-3.0], [3.0]))], horizon=1.0)
+    assert (graph.verdict("lobes", "all").status is Status.CERTIFIED) == certified
+
+
+@pytest.mark.usefixtures("late")
+def test_the_flowpipe_leaves_out_a_piece_that_turns_out_empty(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(flowpipe, "PROGRESS", 0.0)
+    # From x0 = 0, between the lobes, the other state escapes at t = .3; from the lobes it grows by 15 % at most.
+    mode = lobes(
+        lambda x: np.array([0.0, 3.0 * (x[0] ** 2 - 1.0) ** 2 * x[1] ** 2]),
+        lambda x: np.maximum((x[0] ** 2 - 1.0) ** 2, np.abs(x[1] - 1.0) - 0.06), 2,
+    )  # fmt: skip
+    pipe = mg.flowpipe(mode, horizon=1.0)
+    assert pipe.complete, pipe.reason
+    box = pipe.at(1.0)
+    assert (box.lo <= [-np.sqrt(1.2), 0.9]).all()
+    assert (box.hi >= [np.sqrt(1.2), 1.1]).all()
+    assert box.hi[1] < 1.4

@@ -206,7 +206,7 @@ def _crossing(
 def _sampled(
     reach: Reach, region: Region, piece: Piece, p: Floats, generators: Sequence[Floats]
 ) -> tuple[bool, Floats]:
-    """Whether every sampled start is inside at some instant (floats: a guess).
+    """Whether every sampled start is inside at some instant (floats: a guess), and the worst of them.
 
     Under a disturbance the remainder counts, for smaller parts do not make it smaller.
     """
@@ -217,7 +217,7 @@ def _sampled(
     gauges = region.point_gauges(points, z if reach.flow.w_radius.any() else None)
     each = gauges.min(axis=0)
     worst = int(np.argmax(each))
-    return bool((each < 1.0).all()), eta[worst]
+    return not piece.known or bool((each < 1.0).all()), eta[worst]
 
 
 def widest_variable(bounds: PolynomialBounds, p: Floats) -> int:

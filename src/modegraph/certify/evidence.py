@@ -55,7 +55,7 @@ def width_over_time(flows: Sequence[Flow]) -> Widths | None:
 def sampled_violation(flow: Flow) -> bool:
     """Whether a sampled trajectory breaks a constraint at the end of the flow (floats: a guess)."""
     fld = flow.fields[flow.steps[-1].segment if flow.steps else 0]
-    if not fld.faces:
+    if not fld.faces or not flow.piece.known:
         return False
     p, G = flow.set_at(len(flow.steps))
     powers = sample_powers(flow.piece, flow.bounds.exponents)

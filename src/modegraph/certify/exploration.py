@@ -17,6 +17,7 @@ from ..reach.decay import SettledLoop
 from ..reach.field import Field
 from ..reach.flow import RESTART_STEPS, Flow, Order
 from ..reach.framing import generator_box
+from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
 from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
@@ -201,11 +202,12 @@ class Exploration:
         flow = found.flow
         assert flow is not None
         variable = nonlinear_variable(flow) if cut_short else widest_variable(flow.bounds, flow.set_at(0)[0])
+        # No halves: the piece is proved to hold no start, though only now that it is cut.
         pieces = piece.split(variable)
         children: list[Findings] = []
         for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
             children.append(part)
-            if piece.chart.sublevel is None and not better(part, found, again, check_again):
+            if piece.chart.sublevel is None and not part.empty and not better(part, found, again, check_again):
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
                 return found
         return merge(found, children, again, check_again)
@@ -287,15 +289,18 @@ class Exploration:
                     tail, decay = outcome, outcome.decay
                 else:
                     reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
-                    if not pending:
-                        tail = self._sink(flow, pending)
-                        decay = tail.tail().decay if tail is not None else np.inf
+                    sunk = self._sink(flow, pending) if not pending else None
+                    if isinstance(sunk, Sinking):
+                        tail, decay = sunk, sunk.tail().decay
+                    elif sunk is not None and sunk.reason.partition(":")[0] not in reason:
+                        # Not the same again with other numbers.
+                        reason = f"{reason}; no funnel either: {sunk.reason}"
             if not pending and (tail is not None or not safety):
                 break
             settled = tail is not None and np.isfinite(decay) and flow.time > tail.start + SETTLING / decay
             if settled and all(now[j] > 0.98 * previous[j] for j in pending):
                 sinking = self._sink(flow, pending)
-                if sinking is not None and any(self._arrives(sinking, j) for j in pending):
+                if isinstance(sinking, Sinking) and any(self._arrives(sinking, j) for j in pending):
                     tail = sinking
                     break
                 if flow.frame is not None or self.framed[0].frame is None:
@@ -327,13 +332,12 @@ class Exploration:
         flow.next_restart = len(flow.steps) + RESTART_STEPS
         return None
 
-    def _sink(self, flow: Flow, pending: Sequence[int]) -> Sinking | None:
-        """A funnel that holds the end of a flow and leads into the pending targets if possible."""
+    def _sink(self, flow: Flow, pending: Sequence[int]) -> Sinking | NoFunnel | None:
+        """A funnel that holds the end of a flow and leads into the pending targets if possible; None: not tried."""
         funnels = self.funnels(flow.piece)
         if funnels is None or self.linear:
             return None
-        found = funnels.enter(flow, [self.goals[j].region for j in pending if self.goals[j].reset is None])
-        return found if isinstance(found, Sinking) else None
+        return funnels.enter(flow, [self.goals[j].region for j in pending if self.goals[j].reset is None])
 
     def _arrives(self, sinking: Sinking, j: int) -> bool:
         goal = self.goals[j]
@@ -369,20 +373,22 @@ class Exploration:
         """
         flow = flows[-1]
         found = Findings(flow=flows[0], last=flow, tail_reason=tail_reason)
-        proved = proved_instants(flow)
+        # The first flow that is not proved to its end, if there is one.
+        short = next((f for f in flows if proved_instants(f) < len(f.steps)), flow)
+        proved = proved_instants(short)
         if flow.failure is not None:
             found.failure = str(flow.failure)
-        if proved < len(flow.steps):
-            found.unproved = self._unproved(flow, proved)
+        if proved < len(short.steps):
+            found.unproved = self._unproved(short, proved)
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)
-        found.safe_until = float(flow.times[proved]) if proved >= 0 else float(flow.times[0])
+        found.safe_until = float(short.times[proved]) if proved >= 0 else float(short.times[0])
         for j in wanted:
             outcome = self._crossing(flows, j, tail if isinstance(tail, Sinking) else None, before)
             if isinstance(outcome, Missed):
                 found.missed[j] = outcome
             else:
                 found.proofs[j] = outcome
-        if safety and proved == len(flow.steps) and flow.failure is None:
+        if safety and proved == len(short.steps) and flow.failure is None:
             found.safety = self._safety(flows, tail.tail() if isinstance(tail, Sinking) else tail, before)
         return found
 
@@ -422,7 +428,8 @@ class Exploration:
             slack.append(slack_until(flow, len(flow.steps)))
         assert best is not None
         last = flows[-1]
-        if sinking is None or goal.reset is not None or proved_instants(last) < len(last.steps):
+        # The search goes on by the bounds of whole steps: starts and breakpoints may lack a proof in any flow.
+        if sinking is None or goal.reset is not None or any(proved_instants(f) < len(f.steps) for f in flows):
             return best
         arrival = sinking.arrival(goal.region, self._end())
         if isinstance(arrival, Missed):

@@ -23,6 +23,8 @@ class Findings:
     unproved: str = ""
     broken: bool = False
     """A sampled start really breaks a constraint: smaller parts cannot help."""
+    empty: bool = False
+    """The part is proved to hold no start: the others decide without it."""
     flow: Flow | None = None
     last: Flow | None = None
     parked: list[Flow] = field(default_factory=list)
@@ -55,6 +57,10 @@ def settle(found: Findings, j: int, proof: SwitchProof | None, parts: Sequence[F
 
 def merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], safety: bool) -> Findings:
     """What the parts prove together is proved of the whole; what some wait for, the whole waits for."""
+    parts = [part for part in parts if not part.empty]
+    if not parts:
+        found.empty = True
+        return found
     found.parked = [flow for part in parts for flow in part.parked]
     for j in wanted:
         if j in found.proofs:

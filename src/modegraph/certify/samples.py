@@ -13,7 +13,10 @@ SAMPLES = 48
 
 
 def sample_variables(piece: Piece) -> Floats:
-    """Some starts of a piece, (SAMPLES, m) in its scaled variables; half of them extreme."""
+    """Some starts of a piece, (SAMPLES, m) in its scaled variables; half of them extreme.
+
+    Of a Sublevel those that were found, in turn; the middle of a piece where none is `known`.
+    """
     rng = np.random.default_rng(7)
     eta = rng.uniform(-1.0, 1.0, (SAMPLES, piece.variables))
     eta[: SAMPLES // 2] = np.sign(eta[: SAMPLES // 2])
@@ -24,9 +27,8 @@ def sample_variables(piece: Piece) -> Floats:
         xi = xi / np.maximum(length, 1.0)[:, None]
         eta[:, :f] = np.clip((xi - piece.middle[:f]) / np.maximum(piece.radius[:f], 1e-300), -1.0, 1.0)
     if piece.chart.sublevel is not None:
-        found = piece.points[:SAMPLES]
-        eta[:, : piece.chart.free] = 0.0
-        eta[: len(found), : piece.chart.free] = found
+        found = piece.points if piece.known else np.zeros((1, piece.chart.free))
+        eta[:, : piece.chart.free] = found[np.arange(SAMPLES) % len(found)]
     return eta
 
 

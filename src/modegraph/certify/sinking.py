@@ -10,7 +10,7 @@ import numpy as np
 
 from ..reach.decay import SettledLoop
 from ..reach.flow import Flow
-from ..reach.funnel import Funnel, FunnelBuilder, NoFunnel, Sublevel
+from ..reach.funnel import Funnel, FunnelBuilder, NoFunnel, NormBall
 from ..reach.tail import Tail
 from .crossing import Missed
 from .proof import least_slack
@@ -47,8 +47,8 @@ class Sinking:
     def tail(self) -> Tail:
         """All time after ``start``: the rung the flow ends in contains those after it."""
         rungs = self.funnel.rungs[self.rung :]
-        boxes = [self.funnel.sublevel(self.rung, self.radius).box()]
-        boxes += [self.funnel.sublevel(k, r.radius).box() for k, r in enumerate(rungs[1:], self.rung + 1)]
+        boxes = [self.funnel.ball(self.rung, self.radius).box()]
+        boxes += [self.funnel.ball(k, r.radius).box() for k, r in enumerate(rungs[1:], self.rung + 1)]
         return Tail(
             self.start,
             np.max([r.face_upper for r in rungs], axis=0),
@@ -96,7 +96,7 @@ class Sinking:
         return self.funnel.rungs[k].norm is self.funnel.rungs[k + 1].norm
 
     def _gauge(self, k: int, radius: float, region: Region) -> float:
-        return gauge_of(self.funnel.sublevel(k, radius), region)
+        return gauge_of(self.funnel.ball(k, radius), region)
 
     def _within(self, k: int, radius: float, low: float, seconds: float, region: Region) -> float:
         """Seconds from rho <= radius until the target holds {rho <= some radius between}."""
@@ -119,9 +119,9 @@ class Sinking:
         return least_slack({name: -float(v)} for r in rungs for name, v in zip(names, r.face_upper, strict=True))
 
 
-def gauge_of(sublevel: Sublevel, region: Region) -> float:
+def gauge_of(ball: NormBall, region: Region) -> float:
     """Gauge of the states in {rho <= radius} in a target on the first of them."""
-    bounds, p, G = sublevel.set
+    bounds, p, G = ball.set
     n = region.dim
     return float(region.gauges(bounds, p[None, :n], [G[:, :n]])[0])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .adjoint import tighten
 from .jets import solve_in_time
 from .polynomial import KERNEL
 from .remainder import coefficient_norms, remainders, wants_another_try
@@ -35,15 +36,19 @@ def observe_step(
     for r in range(ranges.shape[0]):
         ranges[r, 0] = np.nan
         ranges[r, 1] = np.nan
+    A = local = RQ
     for _attempt in range(2):
         solve_in_time(
             ops, const, kinks, ranges, outputs, variables, np.int64(0), Q, dq, h, KQ,
             cut, product, offset, start, degree,
         )  # fmt: skip
         coefficient_norms(Q, dq, nQ, start)
-        remainders(ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree)
+        _, A, local = remainders(
+            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree
+        )
         if not wants_another_try(ops, kinks, ranges):
             break
+    tighten(ops, const, const_rad, kinks, outputs, Q, RQ, A, local)
     ends = np.zeros((3, count, Nq))
     slack = np.zeros((count, 2))
     for i in range(count):
@@ -98,17 +103,19 @@ def enclose_at(
     for r in range(ranges.shape[0]):
         ranges[r, 0] = np.nan
         ranges[r, 1] = np.nan
+    A = local = RQ
     for _attempt in range(2):
         solve_in_time(
             ops, const, kinks, ranges, outputs, variables, np.int64(0), Q, dq, 1.0, np.int64(0),
             cut, product, offset, start, degree,
         )  # fmt: skip
         coefficient_norms(Q, dq, nQ, start)
-        bad = remainders(
+        bad, A, local = remainders(
             ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, np.int64(0), cut, pairs, product, offset, start, degree
         )
         if not wants_another_try(ops, kinks, ranges):
             break
+    tighten(ops, const, const_rad, kinks, outputs, Q, RQ, A, local)
     out = np.zeros((count, p.shape[1]))
     size = np.zeros(count)
     for i in range(count):

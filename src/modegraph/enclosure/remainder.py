@@ -126,16 +126,16 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
     """Fill R[q] for every node that is not a variable; R of the variables is given.
 
     Also fills ranges[q] with the range of the argument of relu, step and where nodes. A node that
-    is undefined somewhere gets R = inf. Returns the first such node, or -1.
-
-    Without relu, step and where nodes every R is a nondecreasing convex function of the input radii
-    (sums, products and compositions of such functions): ``flow_step`` relies on that.
+    is undefined somewhere gets R = inf. Returns the first such node, or -1, then for every node a bound A of
+    its stored polynomial, and ``local``: what R would be for arguments equal to theirs (R itself for
+    logarithms, arc tangents and kinks).
     """
     nodes = ops.shape[0]
     n = norms.shape[2] - 1
     bad = -1
     tails = np.zeros((nodes, K + 1, n + 2))
     A = np.zeros(nodes)
+    local = np.zeros(nodes)
     work = np.zeros(P.shape[2])
     series = np.zeros(n + 2)
     size = np.zeros(n + 2)
@@ -155,10 +155,13 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
         a = ops[q, 1]
         b = ops[q, 2]
         if op == VAR:
+            local[q] = R[q]
             continue
         if op == CONST:
             R[q] = const_rad[q]
+            local[q] = R[q]
             continue
+        own = -1.0
         if op >= RECIP and op <= ATAN:
             rest = (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0))) * UP + R[a] * UP
             rest += 4.0 * UNIT * (abs(P[a, 0, 0]) + rest)
@@ -167,17 +170,18 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             low, high = image(op, ranges[q, 0], ranges[q, 1])
             if kinks[q, 0] == PLAIN:
                 R[q] = max(abs(high - kinks[q, 1]), abs(low - kinks[q, 1])) * UP + TINY
+                local[q] = R[q]
                 if not R[q] < np.inf:
                     R[q] = np.inf
                     if bad < 0:
                         bad = q
                 continue
         if op in (ADD, SUB):
-            r = R[a] + R[b] + 2.0 * UNIT * (A[a] + A[b])
+            own = 2.0 * UNIT * (A[a] + A[b])
             for j in range(K + 1):
                 e = min(cut[j] + 1, n + 1)
-                r += tails[a, j, e] + tails[b, j, e]
-            R[q] = r * UP
+                own += tails[a, j, e] + tails[b, j, e]
+            R[q] = (R[a] + R[b] + own) * UP
         elif op in (MULC, ADDC):
             f = abs(const[q]) if op == MULC else 1.0
             r = 0.0
@@ -186,13 +190,14 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             spread = const_rad[q] * ((A[a] + R[a]) if op == MULC else 1.0)
             # One rounding a coefficient: of c a, or of a + c.
             rounded = f * A[a] if op == MULC else A[a] + abs(const[q])
-            R[q] = (f * (R[a] + r) + spread + 2.0 * UNIT * rounded) * UP + TINY
+            own = f * r + spread + 2.0 * UNIT * rounded
+            R[q] = (f * R[a] + own) * UP + TINY
         elif op == MUL:
-            lost = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0))
-            R[q] = (A[a] * R[b] + R[a] * A[b] + R[a] * R[b] + lost + gamma * A[a] * A[b]) * UP + TINY
+            own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]
+            R[q] = (A[a] * R[b] + R[a] * A[b] + R[a] * R[b] + own) * UP + TINY
         elif op == SQR:
-            lost = truncated_part(norms[a], tails[a], tails[a], K, cut, np.int64(0))
-            R[q] = (2.0 * A[a] * R[a] + R[a] * R[a] + lost + gamma * A[a] * A[a]) * UP + TINY
+            own = truncated_part(norms[a], tails[a], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[a]
+            R[q] = (2.0 * A[a] * R[a] + R[a] * R[a] + own) * UP + TINY
         elif op == SIN:
             # E = stored - true obeys E_s' = E_c a' + d1, E_c' = -E_s a' + d2: a rotation, so
             # |E|_2 <= |E(0)|_2 + int |d|_2 <= |E(0)|_2 + D1 + D2.
@@ -205,8 +210,10 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
                 speed += j * tails[a, j, 0]
             d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(1)) + gamma * speed * A[b]
             d2 = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(1)) + gamma * speed * A[q]
-            R[q] = (math.sqrt(es * es + ec * ec) + d1 + d2 + R[a]) * UP + TINY
+            own = math.sqrt(es * es + ec * ec) + d1 + d2
+            R[q] = (own + R[a]) * UP + TINY
             R[b] = R[q]
+            local[b] = own * UP + TINY
         elif op == COS:
             continue
         elif op == EXP:
@@ -218,10 +225,10 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
             d1 = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(1)) + gamma * speed * A[q]
             # E' = E a' + d: |E(s)| <= (|E(0)| + D) exp(a(s) - a(tau)).
-            stored = (e0 + d1) * math.exp(travel * UP) * UP
+            own = (e0 + d1) * math.exp(travel * UP) * UP
             top = P[a, 0, 0] + (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0)))
             lip = math.exp(top + 4.0 * UNIT * (abs(top) + A[a])) * math.expm1(R[a] * UP)
-            R[q] = (stored + lip * (1.0 + 4.0 * LIBM)) * UP + TINY
+            R[q] = (own + lip * (1.0 + 4.0 * LIBM)) * UP + TINY
         elif op in (LOG, ATAN):
             travel = 0.0
             speed = 0.0
@@ -255,6 +262,7 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             # |a r - 1 + r (alpha - a)| <= miss < 1 proves alpha != 0 and |1/alpha| <= A_r/(1 - miss).
             if miss < 1.0 - 1e-9:
                 R[q] = miss * A[q] / (1.0 - miss) * UP + TINY
+                own = rho * UP * A[q] / (1.0 - rho * UP) * UP
             else:
                 R[q] = np.inf
         else:
@@ -295,6 +303,7 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
                 for j in range(K + 1):
                     r += tails[branch, j, min(cut[j] + 1, n + 1)]
                 R[q] = (R[branch] + r) * UP if (lo > 0.0 or hi < 0.0) else np.inf
+        local[q] = own * UP + TINY if own >= 0.0 else R[q]
         if op >= RECIP and op <= ATAN and high - low < np.inf and not R[q] < high - low:
             kinks[q, 0] = TOO_WIDE
             kinks[q, 1] = 0.5 * (low + high)
@@ -302,7 +311,7 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             R[q] = np.inf
             if bad < 0:
                 bad = q
-    return bad
+    return bad, A, local
 
 
 @njit(**KERNEL)

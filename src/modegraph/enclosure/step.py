@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .adjoint import tighten
 from .disturbance import DROPPED, disturbance_bounds, disturbance_columns
 from .jets import solve_in_time
 from .polynomial import KERNEL
@@ -67,18 +68,20 @@ def taylor_step(
         ranges[q, 0] = np.nan
         ranges[q, 1] = np.nan
     bad = -1
+    A = local = R
     for _attempt in range(2):
         solve_in_time(
             ops, const, kinks, ranges, outputs, variables, n, P, dg, h, K, cut, product, offset, start, degree
         )
         coefficient_norms(P, dg, norms, start)
         R[:] = 0.0
-        bad = remainders(
+        bad, A, local = remainders(
             ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start,
             degree,
         )  # fmt: skip
         if not wants_another_try(ops, kinks, ranges):
             break
+    tighten(ops, const, const_rad, kinks, outputs, P, R, A, local)
     defect = np.zeros(n)
     in_time = np.zeros(n)
     for i in range(n):
@@ -239,10 +242,11 @@ def flow_step(
             jstart, jdegree,
         )  # fmt: skip
         coefficient_norms(Q, dq, nQ, jstart)
-        bad = remainders(
+        bad, A, local = remainders(
             jops, jconst, jconst_rad, jkinks, jranges, Q, dq, nQ, RQ, KJ, jcut, jpairs, jproduct, joffset,
             jstart, jdegree,
         )  # fmt: skip
+        tighten(jops, jconst, jconst_rad, jkinks, joutputs[: n * (n + nw)], Q, RQ, A, local)
         for o in joutputs:
             if not RQ[o] < np.inf:
                 return JACOBIAN_UNDEFINED, bad, nothing_p, G, ebox, nothing, defect, control

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..enclosure.monomials import monomial_count, monomials
 from ..enclosure.rounding import TINY, UNIT
 from .field import Field, cover
+from .inverse import near_inverse
 from .pointwise import evaluate_over
 from .quadric import Quadric
 
@@ -53,9 +54,10 @@ class Norm:
         n = len(centre)
         if not np.isfinite(axes).all() or not np.linalg.cond(axes) < 1e8:
             return None
-        N = np.asarray(np.linalg.inv(axes), float)
-        miss = np.abs(N @ axes - np.eye(n)) + 2.0 * (n + 2) * UNIT * (np.abs(N) @ np.abs(axes))
-        off = float(miss.sum(axis=1).max()) * (1.0 + 8.0 * n * UNIT)
+        found = near_inverse(axes)
+        if found is None:
+            return None
+        N, off = found
         return cls(centre, axes, N, off) if off * math.sqrt(n) < 1e-3 else None
 
     @property

@@ -22,7 +22,7 @@ from .compiled import CompiledMode, compile_mode
 from .field import Field
 from .flow import Order
 from .ladder import class_orders, is_light, orders
-from .looseness import is_loose, is_very_loose, looseness, remainder
+from .looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
 from .restrictor import Restrictor
 from .slices import Slice, Slicer, hull
 from .start import Piece
@@ -289,8 +289,8 @@ class Cutting:
         while not stuck and any(part.chain.failure for part in parts):
             worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
             piece = worst.chain.piece
-            ended = time.monotonic() > self.deadline or len(parts) >= MOST_PIECES
-            if ended or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+            enough = time.monotonic() > self.deadline or len(parts) >= MOST_PIECES
+            if enough or piece.depth >= DEEPEST_CUT or piece.variables == 0:
                 stuck = "; no more are tried"
                 break
             children = self._halves(worst, ladder)
@@ -298,6 +298,7 @@ class Cutting:
             if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
                 stuck = "; cutting it gets no further"
                 break
+            # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
             parts = [part for part in parts if part is not worst] + children
         if self.compiled.parameters and not stuck and not self.disturbed:
             parts = self._tighter(parts, ladder)
@@ -331,7 +332,7 @@ class Cutting:
                 break
             chain = Chain(self.compiled, self.framed, piece, ladder[rung], self.deadline)
             impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
-            done = chain.run(self.end, is_very_loose if impatient else None)
+            done = chain.run(self.end, is_given_up if impatient else None)
             if done and chain.time < self.end:
                 given_up = _Part(chain, rung, top)
                 continue

@@ -8,18 +8,19 @@ within log((a - mu/alpha) / (b - mu/alpha)) / alpha seconds, and stays below.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import dropwhile, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.monomials import monomials
 from ..enclosure.rounding import TINY, UNIT
-from ..expression.evaluate import Evaluator
 from .bounds import PolynomialBounds
 from .decay import DecayRegion, Norm, SettledLoop
+from .float_loop import FloatLoop
 from .lyapunov import shrinking_ellipsoid
 from .pointwise import evaluate_over
 from .start import Chart, Piece
@@ -49,7 +50,7 @@ STRIDES = (0.6, 0.75, 0.88, 0.94)
 
 
 @dataclass(frozen=True)
-class Sublevel:
+class NormBall:
     """{rho <= radius} as a set the engine can bound: p(xi) = centre + radius A xi over the unit ball."""
 
     norm: Norm
@@ -117,6 +118,11 @@ class Rung:
     tracking: Floats
 
     @property
+    def legal(self) -> bool:
+        """Whether the constraints are proved on it, and a bound of the inputs."""
+        return bool((self.face_upper <= 0.0).all() and np.isfinite(self.power))
+
+    @property
     def floor(self) -> float:
         """Upper bound of mu / alpha, the value V sinks to."""
         return self.mu / self.alpha * (1.0 + 4.0 * UNIT)
@@ -134,6 +140,15 @@ class Rung:
         """Upper bound of rho after some seconds, from rho <= a."""
         left = math.exp(-self.alpha * seconds * (1.0 - 1e-9)) * (1.0 + 1e-9)
         return min(a, math.sqrt((self.floor + max(0.0, a * a - self.floor * (1.0 - 1e-9)) * left) * (1.0 + 1e-9)))
+
+
+def usable(rungs: Sequence[Rung]) -> tuple[Rung, ...]:
+    """The first legal rungs without a gap: a rung in a new norm may reach beyond the one before.
+
+    What enters before a gap passes it; what might enter behind it is given up.
+    """
+    begun = dropwhile(lambda rung: not rung.legal, rungs)
+    return tuple(takewhile(lambda rung: rung.legal, begun))
 
 
 @dataclass(frozen=True)
@@ -163,20 +178,19 @@ class Funnel:
         return float(first.norm.quadric.gauges(bounds, p[None], [G])[0]) / first.radius
 
     @property
-    def end(self) -> Sublevel:
+    def end(self) -> NormBall:
         """Where everything is in the end."""
-        return self.sublevel(len(self.rungs) - 1, self.rungs[-1].lower)
+        return self.ball(len(self.rungs) - 1, self.rungs[-1].lower)
 
-    def sublevel(self, k: int, radius: float) -> Sublevel:
-        return Sublevel(self.rungs[k].norm, radius, self.loop)
+    def ball(self, k: int, radius: float) -> NormBall:
+        return NormBall(self.rungs[k].norm, radius, self.loop)
 
 
 @dataclass(frozen=True)
 class NoFunnel:
-    """Why there is no funnel; ``final``: nowhere in this loop."""
+    """Why there is no funnel."""
 
     reason: str
-    final: bool = False
 
 
 class FunnelBuilder:
@@ -184,53 +198,15 @@ class FunnelBuilder:
 
     def __init__(self, loop: SettledLoop) -> None:
         self.loop = loop
-        self._slope = Evaluator(loop.fld.jacobian)
-        self._rates = Evaluator(loop.fld.rates)
+        self._floats = FloatLoop(loop.fld, loop.w_centre, loop.w_radius, loop.unknown_lo, loop.unknown_hi)
 
     # -- floats: proposals -----------------------------------------------------------------------
 
-    def _inputs(self, x: Floats, spread: bool) -> Floats:
-        """Tape variables (nv, K) at points x (K, n); disturbance and unknowns at random corners, or central."""
-        loop, fld = self.loop, self.loop.fld
-        rng = np.random.default_rng(3)
-        out = np.zeros((fld.variables, len(x)))
-        out[: fld.states] = x.T
-        out[fld.time_index] = fld.start
-        middle = np.concatenate([loop.w_centre, 0.5 * (loop.unknown_lo + loop.unknown_hi)])
-        radius = np.concatenate([loop.w_radius, 0.5 * (loop.unknown_hi - loop.unknown_lo)])
-        sign = np.sign(rng.uniform(-1.0, 1.0, (len(radius), len(x)))) * spread
-        out[fld.first_w :] = middle[:, None] + radius[:, None] * sign
-        return out
-
-    def _jacobians(self, x: Floats, spread: bool = True) -> Floats:
-        n = self.loop.fld.states
-        J = self._slope(self._inputs(x, spread))[: n * n].T.reshape(-1, n, n)
-        return np.asarray(J[np.isfinite(J).all(axis=(1, 2))])
-
-    def equilibrium(self, x: Floats) -> Floats | None:
-        """Newton's method from x (any centre is sound)."""
-        x = x.copy()
-        for _ in range(12):
-            rate = self._rates(self._inputs(x[None], False))[:, 0]
-            J = self._jacobians(x[None], False)
-            if not (len(J) and np.isfinite(rate).all()):
-                return None
-            step = np.linalg.lstsq(J[0], -rate, rcond=1e-12)[0]
-            x += step
-            if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + np.abs(x).max(initial=0.0)):
-                break
-        return x if np.isfinite(x).all() else None
-
-    def decay_rate(self, centre: Floats) -> float:
-        """Rate of the slowest mode, 1/s (floats)."""
-        J = self._jacobians(centre[None], False)
-        return -float(np.linalg.eigvals(J[0]).real.max()) if len(J) else -1.0
-
     def _propose(
         self, centre: Floats, push: Floats, scale: Floats, alpha: float,
-        points: Floats, around: Sublevel | None, weight: Floats,
+        points: Floats, around: NormBall | None, weight: Floats,
     ) -> Floats | None:  # fmt: skip
-        """Axes (n, n) of an ellipsoid around the points and around a sublevel set."""
+        """Axes (n, n) of an ellipsoid around the points and around a ball of an earlier norm."""
         n = len(scale)
         y, g = points / scale, push / scale
         at = centre + points
@@ -240,7 +216,8 @@ class FunnelBuilder:
             inner = axes * 1.001 / scale[:, None]
             inside = np.asarray(np.linalg.inv(inner @ inner.T), float)
             at = centre + np.vstack([axes.T, -axes.T])
-        slopes = self._jacobians(np.vstack([centre, at[:: max(1, len(at) // 12)]])) / scale[None, :, None] * scale
+        sampled = self._floats.jacobians(np.vstack([centre, at[:: max(1, len(at) // 12)]]))
+        slopes = sampled / scale[None, :, None] * scale
         for k in range(ROUNDS):
             P = shrinking_ellipsoid(slopes, g, alpha, KEPT, y, inside, weight)
             if P is None:
@@ -250,7 +227,7 @@ class FunnelBuilder:
             rng = np.random.default_rng(k)
             s = rng.normal(size=(SAMPLES, n))
             s /= np.linalg.norm(s, axis=1)[:, None]
-            full = self._jacobians(centre + (s @ back) * scale) / scale[None, :, None] * scale
+            full = self._floats.jacobians(centre + (s @ back) * scale) / scale[None, :, None] * scale
             Z = L.T @ full @ back.T
             gz = g @ L
             m = np.linalg.norm(gz, axis=1) + 1e-300
@@ -263,20 +240,22 @@ class FunnelBuilder:
 
     # -- intervals: proofs -----------------------------------------------------------------------
 
-    def build(self, points: Floats, fit: Floats, enough: Callable[[Sublevel], bool]) -> Funnel | NoFunnel:
+    def build(self, points: Floats, fit: Floats, enough: Callable[[NormBall], bool]) -> Funnel | NoFunnel:
         """A funnel whose mouth holds (about) the points (K, n), narrow enough at its end if that can be proved.
 
         ``fit``: half-widths (n,) whose proportions the ellipsoids are to have.
         """
-        centre = self.equilibrium(points.mean(axis=0))
+        centre = self._floats.equilibrium(points.mean(axis=0), range(self.loop.fld.states))
         if centre is None:
             return NoFunnel("no equilibrium was found near the end of the flowpipe")
-        rate = self.decay_rate(centre)
+        slope = self._floats.jacobian(centre)
+        if not np.isfinite(slope).all():
+            return NoFunnel("the Jacobian at the equilibrium is not finite")
+        rate = -float(np.linalg.eigvals(slope).real.max())
         if not rate > 1e-6:
             return NoFunnel(
                 f"the loop does not settle: its slowest mode has the rate {-rate:.3g} 1/s, so nothing can be said "
-                "for all time",
-                final=True,
+                "for all time"
             )
         found = self.loop.push(centre)
         if found is None:
@@ -286,7 +265,7 @@ class FunnelBuilder:
         scale = np.abs(y).max(axis=0)
         scale = np.maximum(scale, 1e-3 * scale.max(initial=1e-12))
         rungs: list[Rung] = []
-        last: Sublevel | None = None
+        last: NormBall | None = None
         for _ in range(STAGES):
             weight = np.diag((scale / (scale if last is None else fit)) ** 2)
             added = self._stage(centre, push, box, scale, rate, y, last, weight / weight.max(), enough)
@@ -295,18 +274,21 @@ class FunnelBuilder:
             rungs += added
             narrowed = added[-1].lower / added[0].radius
             scale = scale * narrowed
-            last = Sublevel(added[-1].norm, added[-1].lower, self.loop)
+            last = NormBall(added[-1].norm, added[-1].lower, self.loop)
             if narrowed > NARROWED or enough(last):
                 break
         if not rungs:
             return NoFunnel("no ellipsoid around the reach set is proved to shrink")
-        while rungs and not (rungs[0].face_upper <= 0.0).all():
-            rungs.pop(0)
-        return Funnel(self.loop, tuple(rungs)) if rungs else NoFunnel("a constraint fails in the invariant set")
+        kept = usable(rungs)
+        return (
+            Funnel(self.loop, kept)
+            if kept
+            else NoFunnel("a constraint, or a bound of the inputs, fails in the ellipsoids that shrink")
+        )
 
     def _stage(
         self, centre: Floats, push: Floats, box: Floats, scale: Floats, rate: float, points: Floats,
-        last: Sublevel | None, weight: Floats, enough: Callable[[Sublevel], bool],
+        last: NormBall | None, weight: Floats, enough: Callable[[NormBall], bool],
     ) -> list[Rung]:  # fmt: skip
         """Rungs in the most eager norm that can be proved, around the points or inside what was reached last."""
         for eager in EAGER if last is not None else EAGER[2:]:
@@ -327,7 +309,7 @@ class FunnelBuilder:
         return []
 
     def _descend(
-        self, norm: Norm, radius: float, push: Floats, box: Floats, enough: Callable[[Sublevel], bool]
+        self, norm: Norm, radius: float, push: Floats, box: Floats, enough: Callable[[NormBall], bool]
     ) -> list[Rung]:
         """Rungs in one norm from a radius down as far as it shrinks."""
         n = len(norm.centre)
@@ -345,10 +327,10 @@ class FunnelBuilder:
             if chosen is None:
                 return rungs
             alpha, mu, lower = chosen
-            upper, power, tracking = Sublevel(norm, radius, self.loop).observed()
+            upper, power, tracking = NormBall(norm, radius, self.loop).observed()
             rungs.append(Rung(norm, radius, lower, alpha, mu, upper, power, tracking))
             radius = lower
-            if len(rungs) >= MOST_RUNGS or enough(Sublevel(norm, radius, self.loop)):
+            if len(rungs) >= MOST_RUNGS or enough(NormBall(norm, radius, self.loop)):
                 return rungs
 
     def _step_down(

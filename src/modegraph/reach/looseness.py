@@ -17,8 +17,10 @@ LOOSE = 5e-3
 """Share of the remainder in the width of the last set above which a higher degree is tried."""
 LOOSE_CLASS = 0.07
 """The same for a class of references, where a higher degree costs much more."""
+GIVE_UP = 0.02
+"""The same share, above which a run of low degree is given up for the next one: it seldom falls again."""
 VERY_LOOSE = 0.25
-"""The same share, above which a run of low degree is given up for the next one."""
+"""The same share, above which even a degree with many monomials is tried."""
 
 
 def remainder(chain: Chain) -> tuple[Floats, Floats]:
@@ -52,3 +54,8 @@ def is_loose(chain: Chain, share: float | None = None) -> bool:
 
 
 is_very_loose = partial(is_loose, share=VERY_LOOSE)
+
+
+def is_given_up(chain: Chain) -> bool:
+    """Whether a run of low degree need not be carried to its end. (For a class of references the next one is dear.)"""
+    return is_loose(chain, VERY_LOOSE if chain.piece.chart.parameters else GIVE_UP)

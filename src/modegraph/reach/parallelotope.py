@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..enclosure.rounding import UNIT
 from .bounds import PolynomialBounds
 from .flow import generator_box
+from .inverse import near_inverse
 
 Floats = NDArray[np.float64]
 
@@ -23,12 +24,10 @@ def half_widths(bounds: PolynomialBounds, p: Floats, G: Floats, axes: Floats, ce
     k = len(p)
     if not (np.isfinite(axes).all() and np.isfinite(p).all() and np.isfinite(G).all()):
         return np.full(k, np.inf)
-    try:
-        N = np.linalg.inv(axes)
-    except np.linalg.LinAlgError:
+    found = near_inverse(axes)
+    if found is None:
         return np.full(k, np.inf)
-    miss = np.abs(N @ axes - np.eye(k)) + 2.0 * (k + 2) * UNIT * (np.abs(N) @ np.abs(axes))
-    off = float(miss.sum(axis=1).max()) * (1.0 + 8.0 * k * UNIT)
+    N, off = found
     if not off < 0.01:
         return np.full(k, np.inf)
     shifted = p.copy()

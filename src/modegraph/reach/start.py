@@ -169,6 +169,11 @@ class Piece:
         right = hi if b == 1.0 else min(hi, right + slack)
         return float(left), float(right)
 
+    @property
+    def known(self) -> bool:
+        """Whether a start in this piece is known: of a Sublevel, that one was found (floats)."""
+        return self.chart.sublevel is None or len(self.points) > 0
+
     def split(self, variable: int) -> list[Piece]:
         """Two halves along one variable, tightened; a half that holds no start is left out."""
         middle = 0.5 * (self.lo[variable] + self.hi[variable])

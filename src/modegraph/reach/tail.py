@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.evaluate import Evaluator
 from .field import Field
+from .float_loop import FloatLoop
 from .flow import Flow, Order
 from .parallelotope import half_widths, modal_axes
 from .start import Chart, Piece
@@ -83,31 +83,7 @@ class TailSearch:
         self.order = order
         self.states = relevant_states(fld)
         self.possible = bool(np.isinf(fld.end)) and fld.autonomous
-        self._evaluate = Evaluator(fld.rates)
-        self._slope = Evaluator(fld.jacobian)
-
-    def _inputs(self, x: Floats) -> Floats:
-        middle = 0.5 * (self.chart.unknown_lo + self.chart.unknown_hi)
-        return np.concatenate([x, [self.fld.start], self.w_centre, middle])[:, None]
-
-    def _jacobian(self, x: Floats) -> Floats:
-        n = self.fld.states
-        return np.asarray(self._slope(self._inputs(x))[: n * n, 0].reshape(n, n))
-
-    def _equilibrium(self, x: Floats) -> Floats | None:
-        """Newton's method in the relevant states (floats: any centre is sound)."""
-        keep = self.states
-        x = x.copy()
-        for _ in range(12):
-            rate = self._evaluate(self._inputs(x))[keep, 0]
-            slope = self._jacobian(x)[np.ix_(keep, keep)]
-            if not (np.isfinite(rate).all() and np.isfinite(slope).all()):
-                return None
-            step = np.linalg.lstsq(slope, -rate, rcond=1e-12)[0]
-            x[keep] += step
-            if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + np.abs(x).max()):
-                break
-        return x if np.isfinite(x).all() else None
+        self._floats = FloatLoop(fld, w_centre, w_radius, chart.unknown_lo, chart.unknown_hi)
 
     def attempt(self, flows: Sequence[Flow]) -> Tail | TailFailure:
         """Try from the present end of the flows (all the pieces of the starts)."""
@@ -120,10 +96,11 @@ class TailSearch:
         start = max(flow.time for flow in flows)
         if not keep:
             return self._nothing_moves(flows, start)
-        centre = self._equilibrium(np.mean([flow.set_at(len(flow.steps))[0][:, 0] for flow in flows], axis=0))
+        ends = [flow.set_at(len(flow.steps))[0][:, 0] for flow in flows]
+        centre = self._floats.equilibrium(np.mean(ends, axis=0), keep)
         if centre is None:
             return TailFailure("no equilibrium was found near the end of the flowpipe")
-        slope = self._jacobian(centre)[np.ix_(keep, keep)]
+        slope = self._floats.jacobian(centre)[np.ix_(keep, keep)]
         if not np.isfinite(slope).all():
             return TailFailure("the Jacobian at the equilibrium is not finite")
         decay = -np.linalg.eigvals(slope).real.max()
@@ -151,9 +128,7 @@ class TailSearch:
 
     def _disturbed_size(self, inverse: Floats, slope: Floats, centre: Floats) -> Floats:
         """Float estimate of the ultimate bound under the disturbance, in the frame's coordinates."""
-        n, nw = self.fld.states, self.fld.disturbances
-        B = self._slope(self._inputs(centre))[n * n : n * (n + nw), 0].reshape(n, nw)[self.states]
-        push = np.abs(inverse @ B) @ self.w_radius
+        push = np.abs(inverse @ self._floats.disturbance_matrix(centre)[self.states]) @ self.w_radius
         values = np.linalg.eigvals(slope)
         return np.asarray(1.3 * push / max(1e-9, -values.real.max()))
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modegraph.model.sets.base import Floats
 from modegraph.model.sets.level_function import LevelFunction
@@ -182,31 +183,29 @@ def all_inside(function: LevelFunction, lo: Floats, hi: Floats, most: int = MOST
     """Whether every point of the box [lo, hi] is proved to be in the set."""
     if (lo == hi).all():
         return function.holds(lo)
-    below, above = np.array([lo]), np.array([hi])
-    examined = 0
-    while len(below):
-        examined += len(below)
-        missing = ~function.inside(below, above)
-        below, above = below[missing], above[missing]
-        centres = 0.5 * below + 0.5 * above
-        if examined > most or (function.values(centres) > float(function.level)).any():
-            return False
-        count = len(below)
-        below, above = _halved(below, above, above - below)
-        if len(below) < 2 * count:
-            return False
-    return True
+    return _everywhere(function.inside, lambda x: function.values(x) > float(function.level), lo, hi, most)
 
 
 def all_outside(function: LevelFunction, lo: Floats, hi: Floats, most: int = 400) -> bool:
     """Whether no point of the box [lo, hi] is in the set, proved."""
+    return _everywhere(function.outside, lambda x: function.values(x) <= float(function.level), lo, hi, most)
+
+
+def _everywhere(
+    proved: Callable[[Floats, Floats], NDArray[np.bool_]],
+    refuted: Callable[[Floats], NDArray[np.bool_]],
+    lo: Floats,
+    hi: Floats,
+    most: int,
+) -> bool:
+    """Whether something is proved on cells (lower, upper) that cover [lo, hi]; points that refute it end the search."""
     below, above = np.array([lo]), np.array([hi])
     examined = 0
     while len(below):
         examined += len(below)
-        left = ~function.outside(below, above)
+        left = ~proved(below, above)
         below, above = below[left], above[left]
-        if examined > most or (function.values(0.5 * below + 0.5 * above) <= float(function.level)).any():
+        if examined > most or refuted(0.5 * below + 0.5 * above).any():
             return False
         count = len(below)
         below, above = _halved(below, above, above - below)

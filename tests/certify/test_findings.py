@@ -1,0 +1,47 @@
+"""What parts prove is proved of the whole only if no part with starts is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from modegraph.certify.crossing import Missed
+from modegraph.certify.findings import Findings, merge
+from modegraph.certify.proof import SafetyProof, SwitchProof
+
+MISSED = Missed(2.0, 1.0, True, np.zeros(1))
+EMPTY = Findings(missed={0: MISSED}, failure="at t = 0 s", unproved="constraint 'c'", empty=True)
+
+
+def undecided() -> Findings:
+    return Findings(missed={0: MISSED})
+
+
+def proved(latest: float) -> Findings:
+    switch = SwitchProof(0.5, latest, 0.1, 0.0, 1.0, {"c": latest}, 1)
+    return Findings(proofs={0: switch}, safety=SafetyProof({"c": latest}, latest, np.zeros(0)))
+
+
+def test_parts_without_starts_are_not_needed() -> None:
+    found = merge(undecided(), [proved(1.0), EMPTY, proved(2.0)], [0], True)
+    assert found.proofs[0].latest == 2.0
+    assert found.safety is not None
+    assert found.safety.slack == {"c": 1.0}
+    assert not found.missed
+    assert not found.empty
+
+
+@pytest.mark.parametrize("others", [[], [EMPTY], [proved(1.0), EMPTY]])
+def test_a_part_that_is_not_decided_decides_nothing(others: list[Findings]) -> None:
+    found = merge(undecided(), [*others, undecided()], [0], True)
+    assert not found.proofs
+    assert found.safety is None
+    assert not found.empty
+
+
+@pytest.mark.parametrize("parts", [[], [EMPTY, EMPTY]])
+def test_what_has_empty_parts_only_is_empty_and_proves_nothing(parts: list[Findings]) -> None:
+    found = merge(undecided(), parts, [0], True)
+    assert found.empty
+    assert not found.proofs
+    assert found.safety is None
