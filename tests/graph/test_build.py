@@ -176,12 +176,3 @@ def test_horizon_and_budget_are_positive_and_finite(option: str, value: Any) -> 
 def test_wrong_lists_of_modes(modes: Any) -> None:
     with pytest.raises(ModegraphError):
         build(modes)
-
-
-def test_continuous_classes_are_not_built_yet(engine: Engine) -> None:
-    engine(everything)
-    hover = Mode(
-        "hover", PLANT, controller=lambda x, r: r - x, reference=setpoint(Box([0.0], [1.0])), start=Box([0.0], [1.0])
-    )
-    with pytest.raises(NotBuiltYet, match="mode 'hover' are a continuous class; continuous classes in a graph"):
-        build([hover])

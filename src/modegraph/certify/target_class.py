@@ -68,7 +68,7 @@ class TargetClass:
     def affine(self) -> tuple[Floats, Floats] | None:
         """c(p) = c0 + C p, (n,) and (n, k), where c is affine and the limits are fixed; None elsewhere."""
         if not isinstance(self._centre, StartClass):
-            return self._centre, np.zeros((self.dim, 0))
+            return self._centre, np.zeros((self.dim, self.parameters))
         exprs = _numbers(self._centre)
         slopes = derivative(exprs, self._centre.parameters)
         if not all(e.is_constant for row in slopes for e in row) or not all(

@@ -43,7 +43,7 @@ class Objective:
     bottleneck: bool = False
     travelled: bool = False
 
-    def cost(self, verdict: Verdict, r_i: Parameter, r_j: Parameter) -> Cost:
+    def cost(self, verdict: Verdict, r_i: Parameter = None, r_j: Parameter = None) -> Cost:
         """The cost of one certified switch; a switch without an energy bound costs an infinity."""
         infinite, total = 0, Fraction(0)
         if self.travelled:
