@@ -159,3 +159,21 @@ def test_the_rest_of_the_graph_speaks_of_classes(line: mg.ModeGraph) -> None:
     assert any(edge.kind == "stay" for edge in line.edges)
     data: Any = json.loads(line.plan("wide", "home", r_start=[0.5]).to_json())
     assert data["references"][0] == [0.5]
+
+
+def test_nothing_is_certified_of_a_class_whose_limits_fail_on_the_way() -> None:
+    """Starts at speeds up to .5 break a limit of .3; with room for them the same pairs are certified."""
+    plant = double_integrators(1)[0].system
+
+    def graph(limit: float) -> mg.ModeGraph:
+        mode = mg.Mode(
+            "held", plant, controller=lambda x, r: -(x[:1] - r) - 2.0 * x[1:],
+            reference=mg.setpoint(mg.Box([-1.0], [1.0])), start=lambda r: mg.Ball([r[0], 0.0], 0.5),
+            constraints=lambda x: {"speed": abs(x[1]) <= limit},
+        )  # fmt: skip
+        return mg.build([mode], horizon=6.0)
+
+    strict, relaxed = graph(0.3), graph(0.6)
+    assert strict.verdict("held", "held", [0.0], [0.1]).status is mg.Status.UNDECIDED
+    assert strict.check("held").status is not mg.Status.CERTIFIED
+    assert relaxed.verdict("held", "held", [0.0], [0.1]).status is mg.Status.CERTIFIED

@@ -112,10 +112,9 @@ class _Unit:
 
     def links(self, relations: Sequence[Relation | str] | str, slack: Any = None) -> dict[tuple[Node, Node], Link]:
         """Links to ``linked_nodes``; one text for all where nothing is known."""
-        horizon = math.inf if self.horizon is None else self.horizon
         many = [relations] * len(self.linked_nodes) if isinstance(relations, str) else relations
         return {
-            (self.node, node): Link(relation, slack or {}, horizon)
+            (self.node, node): Link(relation, slack or {}, self.horizon)
             for node, relation in zip(self.linked_nodes, many, strict=True)
         }
 

@@ -29,12 +29,12 @@ class Link:
     """What is known of the switch between two nodes, one of them a whole continuous class.
 
     ``relation`` is a text where there can be none. ``slack`` of the constraints and ``horizon`` in
-    seconds belong to the source.
+    seconds (None: as far as the flowpipe went) belong to the source.
     """
 
     relation: Relation | str
     slack: Mapping[str, float]
-    horizon: float
+    horizon: float | None
 
 
 @dataclass
@@ -184,8 +184,9 @@ def _missed(link: Link, gauge: float) -> Verdict:
     if not np.isfinite(gauge):
         reason = "the flowpipe of the source does not get far enough for any instant to count"
         return Verdict(Status.UNDECIDED, reason, horizon=link.horizon)
+    within = "" if link.horizon is None else f" within {link.horizon:g} s"
     reason = (
-        f"no common time was found within {link.horizon:g} s: at best the worst part of the starts reaches "
+        f"no common time was found{within}: at best the worst part of the starts reaches "
         f"{gauge:.3g} times the size of the target (1 is needed)"
     )
     return Verdict(Status.UNDECIDED, reason, margin=1.0 - gauge, horizon=link.horizon)

@@ -93,12 +93,15 @@ class _Centres:
         return unique[:MOST_PLACES]
 
     def place(self, name: str, r: Any) -> Floats | None:
-        """The centre of the start set; None for a class without a reference."""
+        """The centre of the start set; None for a class without a reference, where that matters."""
         if name in self.graph.regions:
             goal = self._class(name)
-            if r is None or goal is None:
+            if goal is None:
                 return None
-            p = np.atleast_1d(np.asarray(r, float))
+            fixed = goal.affine is not None and not goal.affine[1].any()
+            if r is None and not fixed:
+                return None
+            p = np.asarray(self.graph.regions[name].center if r is None else np.atleast_1d(r), float)
             return np.array(goal.at(p[None])[0][0])
         goal = self._class(name)
         return None if goal is None else np.array(goal.at(np.zeros((1, 0)))[0][0])
