@@ -177,3 +177,19 @@ def test_nothing_is_certified_of_a_class_whose_limits_fail_on_the_way() -> None:
     assert strict.verdict("held", "held", [0.0], [0.1]).status is mg.Status.UNDECIDED
     assert strict.check("held").status is not mg.Status.CERTIFIED
     assert relaxed.verdict("held", "held", [0.0], [0.1]).status is mg.Status.CERTIFIED
+
+
+def test_instants_before_a_limit_fails_may_be_used() -> None:
+    plant = double_integrators(1)[0].system
+    mode = mg.Mode(
+        "early", plant, controller=lambda x, r: -(x[:1] - r) - 2.0 * x[1:],
+        reference=mg.setpoint(mg.Box([-1.0], [1.0])), start=lambda r: mg.Ball([r[0], 0.0], 0.5),
+        constraints=lambda x, t: {"in time": t <= 4.0, "speed": abs(x[1]) <= 0.6},
+    )  # fmt: skip
+    graph = mg.build([mode], horizon=12.0)
+    verdict = graph.verdict("early", "early", [0.0], [0.2])
+    assert verdict.status is mg.Status.CERTIFIED
+    assert verdict.time is not None
+    assert verdict.time[1] <= 4.0
+    assert all(slack >= 0.0 for slack in verdict.slack.values())
+    assert graph.verdict("early", "early", [0.0], [0.4999]).status is mg.Status.UNDECIDED

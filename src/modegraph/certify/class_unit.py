@@ -16,7 +16,7 @@ from ..model.mode import Mode
 from ..model.trajectory import at_instant
 from ..reach.chain import Chain, nonlinear_variable
 from ..reach.compiled import CompiledMode, compile_mode
-from ..reach.flow import Order
+from ..reach.flow import Flow, Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
 from ..reach.ladder import CURVED
 from .crossing import proved_instants
@@ -75,30 +75,32 @@ def relate(
             continue
         parts = [_part(chain, goal, end, parameters) for chain in chains]
         relations.append(whole_relation(parameters, goal, parts, _resting(mode, p, compiled)))
-    slack = least_slack(slack_until(f, len(f.steps)) for c in chains for f in c.flows)
+    slack = least_slack(slack_until(flow, k) for chain in chains for flow, k in _proved(chain))
     return ClassResult(relations, _check(compiled, chains), slack, end)
 
 
 def _part(chain: Chain, goal: TargetClass, end: float, parameters: int) -> Part | None:
-    found = []
-    for flow in chain.flows:
-        moments = moments_of(flow, goal, end, parameters)
-        if moments is not None:
-            found.append(moments)
-        if proved_instants(flow) < len(flow.steps):
-            break
+    moments = (moments_of(flow, goal, end, parameters) for flow, _ in _proved(chain))
+    found = [m for m in moments if m is not None]
     return Part(tuple(found)) if found else None
+
+
+def _proved(chain: Chain) -> list[tuple[Flow, int]]:
+    """The flows of a chain as far as the constraints are proved, each with its last proved instant."""
+    found: list[tuple[Flow, int]] = []
+    for flow in chain.flows:
+        k = proved_instants(flow)
+        if k >= 0:
+            found.append((flow, k))
+        if k < len(flow.steps):
+            break
+    return found
 
 
 def _proved_until(chain: Chain) -> float:
     """Seconds until which the constraints are proved; -1: not even at the start."""
-    for flow in chain.flows:
-        k = proved_instants(flow)
-        if k < 0:
-            return -1.0
-        if k < len(flow.steps):
-            return float(flow.times[k])
-    return chain.time
+    found = _proved(chain)
+    return float(found[-1][0].times[found[-1][1]]) if found else -1.0
 
 
 def _legal_chains(
