@@ -1,4 +1,4 @@
-"""Planar two-link arm: computed torque, PD, disturbed, saturated, along a bang-bang reference."""
+"""Planar two-link arm: computed torque, PD, disturbed, saturated, along a bang-bang reference, to any set-point."""
 
 from __future__ import annotations
 
@@ -79,10 +79,15 @@ def start(angle: float) -> mg.Box:
     return around([0.0] * 4, (angle, angle, 0.1, 0.1))
 
 
+SETPOINTS = mg.setpoint(mg.Box([0.6, 1.0], [1.0, 1.4]))
+"""A class: every goal within .2 rad of GOAL."""
+
 CASES = [
     Case("ARM-0", arm, start(0.1), 3.0),
     Case("ARM-11", partial(arm, m2=1.2), start(0.1), 3.0),
     Case("ARM-12", partial(arm, m2=(0.9, 1.1)), start(0.1), 3.0),
+    Case("ARM-11, set-points +-0.2", partial(arm, m2=1.2, reference=SETPOINTS), start(0.1), 3.0),
+    Case("ARM-12, set-points +-0.2", partial(arm, m2=(0.9, 1.1), reference=SETPOINTS), start(0.1), 3.0),
     *(Case(f"ARM-0, w +-{w:g}", partial(arm, disturbance=w), start(0.1), 3.0) for w in (0.01, 0.1)),
     Case("ARM-0, bang-bang", bang_bang, start(0.1), 3.0),
     *(Case(f"ARM PD +-{a:g}", partial(arm, controller=pd), start(a), 3.0) for a in (0.1, 0.2, 0.3, 0.5)),

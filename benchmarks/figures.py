@@ -23,7 +23,8 @@ class Figures:
     """What is shown of a case, and what it is held against.
 
     ``states``: whose widths at the end are shown. ``seconds``, ``ratio``: the goals; the ratio is to the
-    sampled spread. ``holds``: a property of the whole flowpipe and its name.
+    sampled spread. ``holds``: a property of the whole flowpipe and its name. ``own``: for a class of references,
+    the goal for how wide it is at one of them, as a multiple of that one's own flowpipe.
     """
 
     states: tuple[str, ...] = ()
@@ -33,6 +34,7 @@ class Figures:
     flowstar_width: tuple[float, ...] = ()
     others: str = ""
     holds: tuple[str, Callable[[Flowpipe], bool]] | None = None
+    own: float | None = None
 
 
 def altitude(pipe: Flowpipe) -> bool:
@@ -77,6 +79,8 @@ FIGURES = {
     "ARM-0": Figures(ANGLES, 0.3, 1.02, 16.6, (0.0074, 0.0202), "Flow* simplified by hand: .00032 in .07 s"),
     "ARM-11": Figures(ANGLES, 0.1, 1.06, 3.4, (0.00065, 0.0014), "CAPD only for boxes of +-.01"),
     "ARM-12": Figures(ANGLES, 0.2, 1.08, 45.0, (0.0078, 0.0194)),
+    "ARM-11, set-points +-0.2": Figures(ANGLES, 0.5, own=1.1),
+    "ARM-12, set-points +-0.2": Figures(ANGLES, 1.5, own=1.1),
     "ARM-0, w +-0.01": Figures(ANGLES),
     "ARM-0, w +-0.1": Figures(ANGLES),
     "ARM-0, bang-bang": Figures(ANGLES),

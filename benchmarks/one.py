@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
+
+import numpy as np
 
 import modegraph as mg
 
@@ -57,7 +60,23 @@ def enclosed(case: Case, figures: Figures) -> dict[str, Any]:
         row["widths"] = [float(box.hi[k] - box.lo[k]) for k in index]
         if figures.holds is not None:
             row["holds"] = figures.holds[1](pipe)
+        if figures.own is not None:
+            row["own"] = max(own_ratio(mode, pipe, p, case.until, index) for p in some_references(mode))
     return row
+
+
+def some_references(mode: mg.Mode) -> list[np.ndarray]:
+    """Corners, centre, and the middles between them, of a class of references."""
+    region = mode.reference.region
+    assert region is not None
+    shares = itertools.product((0.0, 0.5, 1.0), repeat=region.dim)
+    return [np.clip(region.lo + np.array(s) * (region.hi - region.lo), region.lo, region.hi) for s in shares]
+
+
+def own_ratio(mode: mg.Mode, pipe: mg.Flowpipe, p: np.ndarray, until: float, index: list[int]) -> float:
+    """How much wider the flowpipe of a class is at one reference than that one's own."""
+    own, one = mg.flowpipe(mode, r=p, horizon=until).at(until), pipe.at(until, r=p)
+    return float(((one.hi - one.lo) / (own.hi - own.lo))[index].max())
 
 
 def report(name: str) -> None:

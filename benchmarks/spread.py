@@ -46,9 +46,10 @@ def sampled_spread(case: Case) -> Floats:
 
 
 def _starts(case: Case, compiled: CompiledMode, count: int) -> tuple[Floats, Floats]:
-    """States (n, N) and unknowns (nd, N): the centre, corners (all, or some), then random ones."""
-    lo = np.concatenate([case.start.lo, [lo for lo, _ in compiled.unknowns.values()]])
-    hi = np.concatenate([case.start.hi, [hi for _, hi in compiled.unknowns.values()]])
+    """States (n, N) and unknowns with parameters (nd, N): the centre, corners (all, or some), then random ones."""
+    constants = [*compiled.unknowns.values(), *compiled.parameters]
+    lo = np.concatenate([case.start.lo, [lo for lo, _ in constants]])
+    hi = np.concatenate([case.start.hi, [hi for _, hi in constants]])
     free = np.flatnonzero(hi > lo)
     rng = np.random.default_rng(5)
     signs = np.zeros((1, len(lo)))

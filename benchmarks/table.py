@@ -31,6 +31,8 @@ def missed(figures: Figures, seen: dict[str, Any]) -> list[str]:
     widths = seen.get("widths", [])
     if figures.ratio is not None and not all(r <= figures.ratio for r in ratios(widths, seen.get("spread", widths))):
         found.append("width")
+    if figures.own is not None and not seen.get("own", float("inf")) <= figures.own:
+        found.append("width of one reference")
     if seen.get("holds") is False:
         found.append("property")
     return found
@@ -48,6 +50,8 @@ def row(name: str, figures: Figures, seen: dict[str, Any]) -> str:
     remarks = [text for text in (seen.get("reason"), figures.others) if text]
     if figures.holds is not None and "holds" in seen:
         remarks.insert(0, f"{figures.holds[0]}: {'proved' if seen['holds'] else 'not proved'}")
+    if figures.own is not None and "own" in seen:
+        remarks.insert(0, f"one reference: at most {seen['own']:.3g} times its own flowpipe (goal {figures.own:g})")
     over = missed(figures, seen)
     if over:
         remarks.insert(0, f"over ({', '.join(over)})")

@@ -16,9 +16,17 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 @pytest.fixture(scope="module")
 def quick_start() -> dict[str, Any]:
     blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    assert len(blocks) == 1
+    assert len(blocks) == 2
     names: dict[str, Any] = {}
     exec(compile(blocks[0], "README.md", "exec"), names)
+    return names
+
+
+@pytest.fixture(scope="module")
+def classes(quick_start: dict[str, Any]) -> dict[str, Any]:
+    """The second block goes on where the first ends."""
+    names = dict(quick_start)
+    exec(compile(re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[1], "README.md", "exec"), names)
     return names
 
 
@@ -44,6 +52,16 @@ def test_both_directions_and_the_checks(quick_start: dict[str, Any]) -> None:
     assert str(graph.explain("brisk", "gentle"))
     for name in ("gentle", "brisk"):
         assert graph.check(name).status is mg.Status.CERTIFIED
+
+
+def test_the_planner_chooses_references(classes: dict[str, Any]) -> None:
+    plan, pairs = classes["plan"], classes["pairs"]
+    assert len(plan.references) == len(plan.modes) >= 3
+    assert pairs.contains([0.2], [0.25])
+    assert not pairs.contains([0.2], [0.5])
+    lower, upper = pairs.volume
+    assert 0.0 < lower <= upper < 4.0
+    assert plan.simulate([-0.6, 0.1]).ok
 
 
 def test_public_names_in_the_text_exist() -> None:

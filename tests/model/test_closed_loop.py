@@ -322,3 +322,40 @@ def test_a_bad_signal_names_the_mode():
     mode = make(reference=mg.trajectory(lambda t, q: t, 1.0))
     with pytest.raises(ModegraphError, match=r"mode 'gentle', signal.*'q'"):
         close_loop(mode)
+
+
+def test_a_continuous_class_has_its_parameters_as_variables():
+    plant = mg.System(lambda x, u, d: np.array([x[1], d["p[0]"] * u[0]]), states="p[1] v", inputs="u",
+                      unknowns={"p[0]": (0.9, 1.1)})  # fmt: skip
+    mode = mg.Mode(
+        "class",
+        plant,
+        controller=lambda x, r, z: r[0] - x[0] - z[0],
+        reference=mg.setpoint(mg.Box([0.0, 1.0], [1.0, 2.0])),
+        start=lambda r: mg.Ball([r[0], 0.0], r[1]),
+        constraints=lambda x, r: {"near": abs(x[0] - r[0]) <= r[1]},
+        memory=mg.Memory("z", lambda x, r: x[:1] - r[:1], lambda x, r: r[1:] * x[1]),
+        output=lambda x: x,
+    )
+    loop = close_loop(mode)
+    first, second = loop.parameters
+    assert len({e.text() for e in [*loop.states, *loop.parameters, *loop.unknowns.values()]}) == 6
+    (segment,) = loop.segments
+    assert segment.inputs[0].depends_on([first])
+    assert all(face.expr.depends_on([first]) and face.expr.depends_on([second]) for face in segment.constraints)
+    assert segment.rhs[2].depends_on([first])
+    assert loop.reset[0].depends_on([second])
+    assert segment.tracking[1].depends_on([second])
+    assert loop.typical.shape == (3 + 1 + 0 + 1 + 2, loop.typical.shape[1])
+    alone = close_loop(mode, [0.5, 1.5])
+    assert alone.parameters == []
+    with pytest.raises(ModegraphError, match="names no reference"):
+        close_loop(mode, [0.5, 2.5])
+
+
+def test_a_class_is_tried_at_its_middle_reference():
+    mode = make(
+        name="hold", controller=lambda x, r: np.log(r - 1.0) - x[:1], reference=mg.setpoint(mg.Box([0.0], [1.0]))
+    )
+    with pytest.raises(ModegraphError, match="controller returned"):
+        close_loop(mode)

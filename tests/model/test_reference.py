@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.errors import ModegraphError
 from modegraph.model.reference import ReferenceValue, text_of
 
 
@@ -72,9 +72,49 @@ def test_bad_references(make, words):
     assert words in str(error.value)
 
 
-def test_continuous_classes_are_not_built_yet():
-    with pytest.raises(NotBuiltYet, match="continuous reference classes"):
-        mg.setpoint(mg.Box([0], [1]))
+def test_a_continuous_class():
+    reference = mg.setpoint(mg.Box([0, -1], [1, 1]))
+    assert reference.dim == 2
+    assert reference.is_constant
+    assert reference.region == mg.Box([0, -1], [1, 1])
+    p = reference.find([0.25, 1])
+    assert p.tolist() == [0.25, 1.0]
+    assert not p.flags.writeable
+    r = reference.at(3.0, [0.25, 1])
+    assert r.tolist() == r.p.tolist() == [0.25, 1.0]
+    assert r.dot.tolist() == [0.0, 0.0]
+    with pytest.raises(ModegraphError, match="cannot be listed"):
+        reference.parameters()
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        (None, r"continuous class, \(0, -1\) to \(1, 1\); name one"),
+        ((), "name one"),
+        ([0.5], "give 2 numbers"),
+        (0.5, "give 2 numbers"),
+        ([0.5, np.nextafter(1.0, 2.0)], "names no reference; the class is"),
+        ([float("nan"), 0.0], "names no reference"),
+        ("left", "names no reference"),
+    ],
+)
+def test_what_names_no_reference_of_a_class(name, words):
+    with pytest.raises(ModegraphError, match=words):
+        mg.setpoint(mg.Box([0, -1], [1, 1])).find(name)
+
+
+def test_a_finite_class_finds_its_own_points():
+    assert mg.setpoint(mg.Points([[0.0], [1.0]])).find(1).tolist() == [1.0]
+    assert mg.trajectory(lambda t: t, 1.0).find() is None
+
+
+def test_too_many_parameters():
+    box = mg.Box([0] * 7, [1] * 7)
+    with pytest.raises(ModegraphError, match="at most 6 parameters, this Box has 7"):
+        mg.setpoint(box)
+    with pytest.raises(ModegraphError, match="trajectory: over: a continuous class"):
+        mg.trajectory(lambda t, p: p[0] * t, 1.0, over=box)
 
 
 def test_a_value_keeps_its_derivatives_when_sliced():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.errors import ModegraphError
 from modegraph.expression.scalar import Graph
 
 
@@ -99,6 +99,28 @@ def test_bad_trajectories(make, words):
     assert words in str(error.value)
 
 
-def test_continuous_classes_are_not_built_yet():
-    with pytest.raises(NotBuiltYet, match="continuous reference classes"):
-        mg.trajectory(ramp, 1.0, over=mg.Box([0], [1]))
+def test_a_continuous_class():
+    signal = lambda t, p: np.array([p[0] * t + p[1]])
+    reference = mg.trajectory(signal, 2.0, over=mg.Box([0, 1], [1, 2]))
+    listed = mg.trajectory(signal, 2.0, over=mg.Points([[0.3, 1.5]]))
+    assert reference.dim == 1
+    assert reference.region == mg.Box([0, 1], [1, 2])
+    here, there = reference.at(0.7, [0.3, 1.5]), listed.at(0.7, [0.3, 1.5])
+    assert (here.tolist(), here.dot.tolist(), here.p.tolist()) == (there.tolist(), there.dot.tolist(), there.p.tolist())
+    with pytest.raises(ModegraphError, match="continuous class"):
+        reference.at(0.0)
+    with pytest.raises(ModegraphError, match="names no reference"):
+        reference.at(0.0, [2.0, 1.0])
+    for k in range(200):
+        reference.at(1.0, [k / 200, 1.0])
+
+
+def test_a_class_is_traced_with_its_parameters():
+    graph = Graph()
+    time, p = graph.variable("t"), graph.variables(["p[0]", "p[1]"])
+    signal = lambda t, p: np.where(t < 1.0, p[0] * t**2, p[0] * (2.0 * t - 1.0)) + p[1]
+    reference = mg.trajectory(signal, 2.0, over=mg.Box([0, 0], [1, 1]), breakpoints=[1.0])
+    pieces = reference.pieces(graph, time, p, "mode 'm'")
+    assert [piece.ddot[0].text() for piece in pieces] == ["2*p[0]", "0", "0"]
+    assert pieces[-1].value[0].text() == "p[1] + 3*p[0]"
+    assert [(piece.start, piece.end) for piece in pieces] == [(0.0, 1.0), (1.0, 2.0), (2.0, math.inf)]

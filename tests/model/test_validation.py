@@ -50,3 +50,14 @@ def test_bad_lists(modes, words):
     with pytest.raises(ModegraphError) as error:
         validate_modes(modes)
     assert words in str(error.value)
+
+
+def test_the_start_sets_of_a_class_are_checked():
+    def hover(start):
+        return mg.Mode(
+            "hover", PLANT, controller=lambda x: -x[:1], reference=mg.setpoint(mg.Box([0.0], [1.0])), start=start
+        )
+
+    assert validate_modes([hover(lambda r: mg.Ball([r[0], 0.0], 0.5))])
+    with pytest.raises(ModegraphError, match=r"mode 'hover', start: the radius .* for the reference \(0\)"):
+        validate_modes([hover(lambda r: mg.Ball([r[0], 0.0], r[0] - 0.5))])

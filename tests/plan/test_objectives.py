@@ -4,9 +4,10 @@ import math
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
 
-from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.errors import ModegraphError
 from modegraph.plan.objectives import objective
 from tests.graph.fakes import certified
 
@@ -41,6 +42,9 @@ def test_other_objectives_are_errors(minimize: Any) -> None:
         objective(minimize)
 
 
-def test_distance_is_not_built_yet() -> None:
-    with pytest.raises(NotBuiltYet):
-        objective("distance")
+def test_distance_is_that_between_references_of_one_size() -> None:
+    wanted = objective("distance")
+    verdict = certified(2.5, energy=7.0)
+    assert wanted.cost(verdict, np.array([0.0, 0.0]), np.array([3.0, 4.0])) == (0, Fraction(5))
+    assert wanted.cost(verdict, np.array([0.0]), np.array([3.0, 4.0])) == (0, Fraction(0))
+    assert wanted.cost(verdict, None, np.array([3.0])) == (0, Fraction(0))

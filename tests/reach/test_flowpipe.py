@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 
 import modegraph as mg
 from modegraph.reach import flowpipe as module
-from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flowpipe import Flowpipe, orders
+from modegraph.reach.flowpipe import Flowpipe
 
 VDP_SPREAD = np.array([0.104, 0.436])
 TOLERANCE = 1e-9
@@ -264,13 +263,6 @@ def test_one_reference_of_several() -> None:
         mg.flowpipe(mode)
     box = mg.flowpipe(mode, r=[2.0], horizon=8.0).at(8.0)
     np.testing.assert_allclose(box.center, [2.0], atol=1e-4)
-
-
-def test_degrees_rise_only_where_they_are_cheap() -> None:
-    ladder = orders(compile_mode(van_der_pol(), None, observed=False), 2)
-    assert ladder[0].degree == 8
-    assert [o.degree for o in orders(compile_mode(van_der_pol(), None), 7)] == [3, 4, 6]
-    assert [o.degree for o in orders(compile_mode(follower(mg.setpoint([0.0])), None), 1)] == [1]
 
 
 def coupled(b: tuple[float, float]) -> mg.Mode:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,10 @@ from scipy.integrate import solve_ivp
 import modegraph as mg
 from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import CompiledMode, compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow import Flow, Order, generator_box
 from modegraph.reach.restart import restarted
+from modegraph.reach.substitution import Substitution
+from tests.soundness.families import pushed, references, runs
 
 LO, HI = np.array([0.4, -0.1]), np.array([0.6, 0.1])
 
@@ -105,3 +108,50 @@ def test_a_chain_holds_trajectories_under_switched_disturbances(compiled: Compil
             w = -w
         assert (lo - 1e-10 <= x).all()
         assert (x <= hi + 1e-10).all()
+
+
+def ends_at(flow: Flow, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quick box of the last set of one reference."""
+    polynomial, G = flow.state_set(len(flow.steps))
+    fixed, out = Substitution(flow, p)(polynomial, generator_box(G))
+    lo, hi = flow.bounds.ranges(fixed)
+    return lo - out, hi + out
+
+
+def test_a_restart_keeps_what_depends_on_the_reference() -> None:
+    """Twice: first the linear part in the starts is kept as well, then only that in the parameters."""
+    family = pushed()
+    compiled = compile_mode(family.mode, None, observed=False)
+    flow = flow_of(compiled, compiled.whole().split(2)[1], 14)
+    for _ in range(2):
+        following = restarted([flow], compiled.fields)
+        assert following is not None
+        holds(following, points(flow))
+        for p in (np.array([0.25]), np.array([0.3]), np.array([0.5])):
+            before, after = ends_at(flow, p), ends_at(following, p)
+            width = before[1] - before[0]
+            # In state coordinates what is held may be turned: it need not be inside face by face.
+            assert (after[1] - after[0] <= 2.0 * width).all()
+            assert (np.abs(after[0] + after[1] - before[0] - before[1]) <= 0.5 * width).all()
+        flow = following
+        for _ in range(14):
+            assert flow.advance(10.0)
+
+
+def test_runs_of_a_class_stay_inside_after_restarts() -> None:
+    family = pushed()
+    compiled = compile_mode(family.mode, None, observed=False)
+    flow = flow_of(compiled, compiled.whole(), 20)
+    for _ in range(2):
+        following = restarted([flow], compiled.fields)
+        assert following is not None
+        flow = following
+        for _ in range(20):
+            assert flow.advance(10.0)
+    rng = np.random.default_rng(4)
+    until = replace(family, until=flow.time)
+    for p in references(family, 6, rng):
+        x = runs(until, np.repeat(p[None], 40, axis=0), np.array([flow.time]), rng)[0]
+        lo, hi = ends_at(flow, p)
+        assert (lo[:, None] - 1e-10 <= x).all()
+        assert (x <= hi[:, None] + 1e-10).all()

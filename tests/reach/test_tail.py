@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 import modegraph as mg
 from modegraph.certify.unit import compile_mode
 from modegraph.reach.flow import Flow, Order
-from modegraph.reach.tail import Tail, TailSearch, relevant_states
+from modegraph.reach.tail import Tail, TailFailure, TailSearch, relevant_states
+from tests.soundness.families import Family, pendulum, references, runs
 
 
 def mode(dynamics: Callable[..., Any], start: mg.Box, controller: Callable[..., Any] | None = None) -> mg.Mode:
@@ -97,3 +99,38 @@ def test_a_set_that_leaves_is_no_invariant_set(size: float, good: bool) -> None:
     assert flow.advance(0.01)
     search = TailSearch(c.fields[-1], flow.piece.chart, c.w_centre, c.w_radius, c.loop.names, order)
     assert isinstance(search.attempt([flow]), Tail) is good
+
+
+def class_of(width: float) -> Family:
+    """The pendulum held at any angle of a class, from starts around that angle."""
+    family = pendulum()
+    original = family.mode
+    held = mg.Mode(
+        "held", original.system, controller=original.controller, reference=mg.setpoint(mg.Box([0.2], [0.2 + width])),
+        start=lambda r: mg.Ball([r[0], 0.0], 0.05),
+    )  # fmt: skip
+    return replace(family, mode=held, until=8.0)
+
+
+def test_a_class_of_references_has_one_invariant_set_for_all() -> None:
+    """It holds the equilibria of all of them, so it is at least as wide as they lie apart; or there is none."""
+    family = class_of(0.2)
+    compiled = compile_mode(family.mode, None)
+    flow = Flow(
+        compiled.fields, compiled.whole(), compiled.w_centre, compiled.w_radius, Order(4, 3),
+        names=compiled.loop.names,
+    )  # fmt: skip
+    search = TailSearch(
+        compiled.fields[-1], flow.piece.chart, compiled.w_centre, compiled.w_radius, flow.names, Order(4, 3)
+    )
+    found: Tail | TailFailure = TailFailure("")
+    while not isinstance(found, Tail) and flow.time < 4.0 and flow.advance(4.0):
+        found = search.attempt([flow])
+    assert isinstance(found, Tail), found
+    assert found.lo[0] <= 0.2
+    assert found.hi[0] >= 0.4
+    rng = np.random.default_rng(6)
+    times = np.array([found.start, 3.0, 5.0, 8.0])
+    x = runs(family, references(family, 400, rng), times, rng)
+    assert (found.lo[:, None] - 1e-9 <= x).all()
+    assert (x <= found.hi[:, None] + 1e-9).all()

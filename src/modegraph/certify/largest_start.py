@@ -51,7 +51,7 @@ def largest_start(mode: Mode, shape: Set, r: Any = None) -> float:
     """
     if not isinstance(mode, Mode):
         raise ModegraphError(f"largest_start: mode must be a Mode, got {type(mode).__name__}")
-    p = mode.reference.parameters()[mode.match(r)]
+    p = mode.find(r)
     owner = f"largest_start of mode {mode.label_of(p)!r}"
     _require_shape(mode, shape, owner)
     return _Search(mode, compile_mode(mode, p, shape), shape).run()

@@ -166,7 +166,7 @@ class _Unit:
             return
         candidates = [
             k for k, goal in self.goals.items()
-            if goal.region.dim == compiled.plant and is_subset(compiled.start, goal.region.set)
+            if goal.region.dim == compiled.plant and is_subset(compiled.one_start, goal.region.set)
         ]  # fmt: skip
         if not candidates:
             return
@@ -190,7 +190,7 @@ class _Unit:
         box = self.mode.system.disturbance
         return Scene(
             fields=compiled.fields,
-            start=compiled.start,
+            start=compiled.one_start,
             plant=compiled.plant,
             w_lo=np.zeros(0) if box is None else np.asarray(box.lo, float),
             w_hi=np.zeros(0) if box is None else np.asarray(box.hi, float),

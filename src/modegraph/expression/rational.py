@@ -253,16 +253,44 @@ class Field:
         g = self.graph
         if not form.powers:
             return self._horner(form.numerator, nodes)
-        reciprocal = g.number(ONE)
-        for k, e in form.powers.items():
-            if self.reciprocals[k] is None:
-                self.reciprocals[k] = g.recip(self._horner(self.factors[k], nodes))
-            reciprocal = g.mul(reciprocal, g.power(self.reciprocals[k], e))  # type: ignore[arg-type]
+        reciprocal = self._over(form.powers, nodes)
         versions = []
         for quotient, rest in self._divisions(form):
             over = g.mul(self._horner(rest, nodes), reciprocal)
             versions.append(g.add(self._horner(quotient, nodes), over))
         return min(versions, key=lambda k: cost(g, [k]))
+
+    def split(self, form: Form, values: dict[int, Fraction], atoms: dict[int, int]) -> tuple[int, int] | None:
+        """Nodes q and rest with form = q + rest: q is the quotient where atoms of the denominator have these values.
+
+        None where the quotient is zero.
+        """
+        denominator = self.product(form.powers)
+        inside = denominator.degrees()
+        fixed = {
+            f"a{self.position[a]}": self._flint.fmpq(v.numerator, v.denominator)
+            for a, v in values.items()
+            if inside[self.position[a]]
+        }
+        top, bottom = (p.subs(fixed) if fixed else p for p in (form.numerator, denominator))
+        quotient = divmod(top, bottom)[0] if bottom else bottom
+        if not quotient:
+            return None
+        rest = self._normal(form.numerator - self._times(quotient, denominator))
+        nodes = [atoms[a] for a in self.atoms]
+        over = self.graph.mul(self._horner(rest, nodes), self._over(form.powers, nodes))
+        return self._horner(quotient, nodes), over
+
+    def _over(self, powers: dict[int, int], nodes: list[int]) -> int:
+        """1 / denominator as a node."""
+        g = self.graph
+        reciprocal = g.number(ONE)
+        for k, e in powers.items():
+            known = self.reciprocals[k]
+            if known is None:
+                known = self.reciprocals[k] = g.recip(self._horner(self.factors[k], nodes))
+            reciprocal = g.mul(reciprocal, g.power(known, e))
+        return reciprocal
 
     def _divisions(self, form: Form) -> list[tuple[Polynomial, Polynomial]]:
         """Ways to write numerator = quotient * denominator + rest."""

@@ -58,16 +58,24 @@ class Simplified:
     guards: list[Expr] = field(default_factory=list)
 
 
-class _Pass:
-    """One bottom-up rewriting of all nodes."""
+class Pass:
+    """One bottom-up rewriting of all nodes.
+
+    Attributes
+    ----------
+    forms : {node: Form or None}
+        Rational functions of the atoms; None where that got too big.
+    atom_nodes : {atom: node}
+        What stands for each atom of ``field``.
+    """
 
     def __init__(self, graph: Graph, order: list[int], *, reduce: bool, deadline: float) -> None:
         self._graph = graph
         self._deadline = deadline
-        self._field = Field(graph, atoms_of(graph, order), reduce=reduce, deadline=deadline)
-        self._forms: dict[int, Form | None] = {}
+        self.field = Field(graph, atoms_of(graph, order), reduce=reduce, deadline=deadline)
+        self.forms: dict[int, Form | None] = {}
         self._by_node: dict[int, Form] = {}
-        self._atom_nodes: dict[int, int] = {k: k for k in self._field.atoms}
+        self.atom_nodes: dict[int, int] = {k: k for k in self.field.atoms}
         self._current: dict[int, int] = {}
         self._settled: dict[int, int] = {}
         for index in order:
@@ -80,23 +88,23 @@ class _Pass:
         node = self._graph.nodes[index]
         if node.op == CONST:
             self._current[index] = index
-            self._forms[index] = self._field.constant(node.const)  # type: ignore[arg-type]
+            self.forms[index] = self.field.constant(node.const)  # type: ignore[arg-type]
             return
         operands = [k for k in (node.a, node.b) if k >= 0]
-        whole = all(self._forms[k] is not None for k in operands)
+        whole = all(self.forms[k] is not None for k in operands)
         pick = self._current.__getitem__ if whole else self.settle
         a, b = pick(node.a), pick(node.b) if node.b >= 0 else -1
         new = self._graph.remake(node, a, b, -1)
         if node.op == RECIP:
             self._keep_note(index, self._graph.coefficient(new)[0])
-        form = combine(self._field, index, self._forms, new) if whole else None
+        form = combine(self.field, index, self.forms, new) if whole else None
         if whole and form is None:
             a, b = self.settle(node.a), self.settle(node.b) if node.b >= 0 else -1
             new = self._graph.remake(node, a, b, -1)
         self._current[index] = new
-        self._forms[index] = form
+        self.forms[index] = form
         if form is not None:
-            self._field.name(form, new)
+            self.field.name(form, new)
 
     def _atom(self, index: int) -> None:
         graph = self._graph
@@ -115,13 +123,13 @@ class _Pass:
         value = graph.value(new)
         base, k = graph.coefficient(new)
         if value is not None:
-            self._forms[index] = self._field.constant(value)
+            self.forms[index] = self.field.constant(value)
             return
         if base not in self._by_node:
-            self._atom_nodes[index] = base
-            self._by_node[base] = self._field.atom(index)
+            self.atom_nodes[index] = base
+            self._by_node[base] = self.field.atom(index)
             self._relate(base)
-        self._forms[index] = self._field.scale(self._by_node[base], k)
+        self.forms[index] = self.field.scale(self._by_node[base], k)
 
     def _keep_note(self, old: int, new: int) -> None:
         notes = self._graph.notes
@@ -135,11 +143,11 @@ class _Pass:
         if op in (SIN, COS):
             sine, cosine = (atom, atom + 1) if op == SIN else (atom - 1, atom)
             if sine in known and cosine in known:
-                self._field.relate(known[sine], Form(1 - known[cosine].numerator ** 2))
+                self.field.relate(known[sine], Form(1 - known[cosine].numerator ** 2))
         argument = square_root_argument(self._graph, atom)
-        form = next((f for k, f in self._forms.items() if self._current[k] == argument), None)
+        form = next((f for k, f in self.forms.items() if self._current[k] == argument), None)
         if argument is not None and form is not None:
-            self._field.relate(known[atom], form)
+            self.field.relate(known[atom], form)
 
     def settle(self, index: int) -> int:
         """The cheaper of the node rebuilt as it is and its form written out."""
@@ -148,14 +156,14 @@ class _Pass:
         return self._settled[index]
 
     def _cheaper(self, index: int) -> int:
-        current, form = self._current[index], self._forms[index]
+        current, form = self._current[index], self.forms[index]
         if form is None or self._graph.nodes[index].op in LEAVES or time.monotonic() > self._deadline:
             return current
         own = cost(self._graph, [current])
         if len(form.numerator) > max(SMALL, 3 * own):
             return current
         try:
-            written = self._field.express(form, self._atom_nodes)
+            written = self.field.express(form, self.atom_nodes)
         except TooBig:
             return current
         return written if cost(self._graph, [written]) < own else current
@@ -181,7 +189,7 @@ def simplify(exprs: Sequence[Expr], *, seconds: float = 1.0) -> Simplified:
     passes = []
     for reduce in (False, True) if _has_relations(graph, order) else (False,):
         limit = deadline if reduce else time.monotonic() + seconds * (0.6 if _has_relations(graph, order) else 1.0)
-        passes.append(_Pass(graph, order, reduce=reduce, deadline=limit))
+        passes.append(Pass(graph, order, reduce=reduce, deadline=limit))
     candidates = [roots] + [[p.settle(k) for k in roots] for p in passes]
     chosen = _cheapest(graph, candidates)
     result = Simplified([Expr(graph, k) for k in chosen])
@@ -213,7 +221,7 @@ def _cheapest(graph: Graph, candidates: list[list[int]]) -> list[int]:
     return best
 
 
-def _obligations(graph: Graph, order: list[int], passes: list[_Pass], chosen: list[int], result: Simplified) -> None:
+def _obligations(graph: Graph, order: list[int], passes: list[Pass], chosen: list[int], result: Simplified) -> None:
     """Fill in what the originals needed to be defined and the result does not mention."""
     kept = set(graph.reachable(chosen))
     seen: set[tuple[Kind, int]] = set()

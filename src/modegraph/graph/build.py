@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from numbers import Real
 from threading import Lock
 from typing import Any
 
+from modegraph.certify.class_unit import relate
+from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.cores import COUNT, one_core
 from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.graph.classes import Classes, Link
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.graph.progress import Progress, reporting
 from modegraph.model.closed_loop import close_loop
@@ -79,11 +82,14 @@ def build(
         results = _Work(units, report, DEFAULT_BUDGET if budget is None else float(budget)).run()
     verdicts: dict[tuple[Node, Node], Verdict] = {}
     checks: dict[Node, Verdict] = {}
+    links: dict[tuple[Node, Node], Link] = {}
     for unit, result in zip(units, results, strict=True):
-        checks[unit.node] = result.check
-        for node, verdict in zip(unit.target_nodes, result.verdicts, strict=True):
+        checks[unit.node] = result.finite.check
+        links |= result.links
+        for node, verdict in zip(unit.target_nodes, result.finite.verdicts, strict=True):
             verdicts[unit.node, node] = verdict
-    return ModeGraph(modes, verdicts, checks)
+    regions = {m.name: m.reference.region for m in modes if isinstance(m, Mode) and m.reference.region is not None}
+    return ModeGraph(modes, verdicts, checks, Classes(regions, links))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +102,27 @@ class _Unit:
     horizon: float | None
     target_nodes: tuple[Node, ...]
     targets: tuple[TargetSpec, ...]
+    linked_nodes: tuple[Node, ...] = ()
+    """Nodes to which there is a relation: one of both is a continuous class."""
+    linked: tuple[TargetSpec, ...] = ()
 
-    def undecided(self, reason: str) -> UnitResult:
+    def undecided(self, reason: str) -> _Result:
         nothing = Verdict(Status.UNDECIDED, reason, horizon=self.horizon)
-        return UnitResult(verdicts=[nothing] * len(self.targets), check=nothing)
+        return _Result(UnitResult([nothing] * len(self.targets), nothing), self.links(reason))
+
+    def links(self, relations: Sequence[Relation | str] | str, slack: Any = None) -> dict[tuple[Node, Node], Link]:
+        """Links to ``linked_nodes``; one text for all where nothing is known."""
+        many = [relations] * len(self.linked_nodes) if isinstance(relations, str) else relations
+        return {
+            (self.node, node): Link(relation, slack or {}, self.horizon)
+            for node, relation in zip(self.linked_nodes, many, strict=True)
+        }
+
+
+@dataclass(frozen=True)
+class _Result:
+    finite: UnitResult
+    links: dict[tuple[Node, Node], Link]
 
 
 def _positive(name: str, value: float | None) -> None:
@@ -116,6 +139,10 @@ def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]
         if isinstance(mode, Target):
             nodes.append(((mode.name, 0), None, mode))
             continue
+        if mode.reference.region is not None:
+            close_loop(mode)
+            nodes.append(((mode.name, 0), None, mode))
+            continue
         for a, p in enumerate(mode.reference.parameters()):
             close_loop(mode, p)
             nodes.append(((mode.name, a), p, mode))
@@ -124,10 +151,34 @@ def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]
     for node, p, mode in nodes:
         if isinstance(mode, Target):
             continue
-        others = tuple(other for other in specs if other != node)
         own = horizon if mode.horizon is None else mode.horizon
-        units.append(_Unit(mode, node, p, own, others, tuple(specs[n] for n in others)))
+        whole = _is_class(mode)
+        linked = tuple(other for other, spec in specs.items() if whole or _is_class(spec.mode))
+        others = tuple(other for other in specs if other != node and other not in linked)
+        units.append(
+            _Unit(mode, node, p, own, others, tuple(specs[n] for n in others), linked, tuple(specs[n] for n in linked))
+        )
     return units
+
+
+def _is_class(mode: Mode | Target) -> bool:
+    return isinstance(mode, Mode) and mode.reference.region is not None
+
+
+def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None]) -> _Result:
+    """Verdicts on the finite targets of a unit, and relations to the continuous ones."""
+    finite: UnitResult | None = None
+    if not _is_class(unit.mode):
+        finite = certify_unit(
+            unit.mode, unit.parameter, list(unit.targets), horizon=unit.horizon, deadline=deadline, progress=progress
+        )
+    if not unit.linked:
+        assert finite is not None
+        return _Result(finite, {})
+    found = relate(
+        unit.mode, unit.parameter, unit.linked, horizon=unit.horizon, deadline=deadline, progress=progress
+    )
+    return _Result(finite or UnitResult([], found.check), unit.links(found.relations, found.slack))
 
 
 @dataclass(eq=False)
@@ -141,7 +192,7 @@ class _Work:
     done: int = 0
     lock: Any = field(default_factory=Lock)
 
-    def run(self) -> list[UnitResult]:
+    def run(self) -> list[_Result]:
         threads = max(1, min(COUNT, len(self.units)))
         self.end = time.monotonic() + self.budget
         self.waiting = len(self.units)
@@ -158,7 +209,7 @@ class _Work:
                 raise
         return [self._result(future, unit) for future, unit in futures.items()]
 
-    def _watch(self, futures: dict[Future[UnitResult], _Unit]) -> None:
+    def _watch(self, futures: dict[Future[_Result], _Unit]) -> None:
         """Wait for all units; the error of a wrong model ends it at once."""
         open_ = set(futures)
         while open_:
@@ -168,12 +219,12 @@ class _Work:
                 self.done += 1
                 self.report(self.done, len(futures), futures[future].mode.name)
 
-    def _stop(self, futures: dict[Future[UnitResult], _Unit]) -> None:
+    def _stop(self, futures: dict[Future[_Result], _Unit]) -> None:
         self.stopped = True
         for future in futures:
             future.cancel()
 
-    def _unit(self, unit: _Unit) -> UnitResult:
+    def _unit(self, unit: _Unit) -> _Result:
         with self.lock:
             # An equal share of the time that is left: a hard unit cannot starve the others.
             rounds = math.ceil(self.waiting / self.threads)
@@ -191,21 +242,14 @@ class _Work:
 
         try:
             with one_core():
-                return certify_unit(
-                    unit.mode,
-                    unit.parameter,
-                    list(unit.targets),
-                    horizon=unit.horizon,
-                    deadline=deadline,
-                    progress=progress,
-                )
+                return _examined(unit, deadline, progress)
         except (ModegraphError, _Stopped):
             raise
         except Exception as error:
             return unit.undecided(f"the proof engine stopped with {type(error).__name__}: {error}")
 
     @staticmethod
-    def _result(future: Future[UnitResult], unit: _Unit) -> UnitResult:
+    def _result(future: Future[_Result], unit: _Unit) -> _Result:
         if not future.cancelled():
             error = future.exception()
             if error is None:

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.references import Cell, Parameter, References, parameter_text
 from modegraph.certify.verdict import Status, Verdict, Widths
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.aggregate import Case, every_member, some_pair
+from modegraph.graph.classes import Classes
 from modegraph.graph.entry import may_enter, plain_state
 from modegraph.graph.submodes import Edge, Submode, algorithm_1
 from modegraph.graph.switch import Switch
@@ -62,14 +64,23 @@ class ModeGraph:
         modes: Sequence[Mode | Target],
         verdicts: Mapping[tuple[Node, Node], Verdict],
         checks: Mapping[Node, Verdict],
+        classes: Classes | None = None,
     ) -> None:
-        """Collect the verdicts of all ordered pairs of nodes and the check of every node."""
+        """Collect the verdicts of all ordered pairs of nodes and the check of every node.
+
+        A continuous class is one node, (name, 0), in ``checks`` and in the links of ``classes``; the
+        references of it that are named become nodes as they are asked for.
+        """
         self._modes = {m.name: m for m in modes}
         self._verdicts = dict(verdicts)
         self._checks = dict(checks)
-        self._parameters: dict[str, tuple[Parameter, ...]] = {
-            m.name: (None,) if isinstance(m, Target) else tuple(m.reference.parameters()) for m in modes
+        self._classes = classes or Classes({}, {})
+        self._parameters: dict[str, Sequence[Parameter]] = {
+            m.name: (None,) if isinstance(m, Target) else tuple(m.reference.parameters())
+            for m in modes
+            if m.name not in self._classes.regions
         }
+        self._parameters = {name: self._parameters.get(name, self._classes.named.get(name, ())) for name in self._modes}
 
     @property
     def modes(self) -> Mapping[str, Mode | Target]:
@@ -100,7 +111,35 @@ class ModeGraph:
         ModegraphError
             For an unknown mode or reference, a Target as source, or when no pair is left.
         """
-        return some_pair(self._cases(self.name_of(i), self.name_of(j), r_i, r_j))
+        source, target = self.name_of(i), self.name_of(j)
+        if self._classes.involves(source, target):
+            return self._class_verdict(source, target, r_i, r_j)
+        return some_pair(self._cases(source, target, r_i, r_j))
+
+    def _class_verdict(self, i: str, j: str, r_i: Any, r_j: Any) -> Verdict:
+        self._running(i, "no switch starts in it")
+        left, right = (self._named(name, r) for name, r in ((i, r_i), (j, r_j)))
+        if left is not None and right is not None:
+            if (i, left) == (j, right):
+                raise ModegraphError(f"mode {i!r}: a switch from a reference to itself means nothing")
+            return self._classes.verdict((i, left), (j, right))
+        known = [None if a is None else self._parameters[name][a] for name, a in ((i, left), (j, right))]
+        return self._classes.existential(i, j, known[0], known[1], self.references(i, j))
+
+    def _named(self, name: str, r: Any) -> int | None:
+        """Position of the reference r of a mode; None where that leaves several."""
+        if r is None and self.has_choice(name):
+            return None
+        return self.indices(name, r)[0]
+
+    def references(self, i: str, j: str) -> ContinuousReferences:
+        """R^ij where one of the classes is continuous."""
+        return self._classes.references(i, j, self._parameters)
+
+    @property
+    def regions(self) -> Mapping[str, Any]:
+        """The continuous classes: a Box of parameters for each mode that has one."""
+        return self._classes.regions
 
     def check(self, i: str | Mode, r: Any = None) -> Verdict:
         """Whether the constraints of mode ``i`` hold for all time, for its whole class of references.
@@ -117,6 +156,9 @@ class ModeGraph:
             For an unknown mode or reference, or a Target, in which no controller runs.
         """
         name = self._running(self.name_of(i), "there is nothing to check in it")
+        if name in self._classes.regions:
+            self.indices(name, r)
+            return self._checks[name, 0]
         return every_member([(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)])
 
     def explain(self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None) -> Explanation:
@@ -194,14 +236,19 @@ class ModeGraph:
 
         return plans(self, k, start, goal, **options)
 
-    def modes_at(self, x: Any) -> list[tuple[str, References]]:
+    def modes_at(self, x: Any) -> list[tuple[str, References | ContinuousReferences]]:
         """The modes and targets that may be entered from the state ``x`` (n,) now.
 
         The References of each hold pairs ``(None, r_j)``: ``.target`` lists the references.
         """
         state = plain_state(x, self.dimension)
-        found = []
+        found: list[tuple[str, References | ContinuousReferences]] = []
         for name, mode in self._modes.items():
+            if name in self._classes.regions:
+                refs = self._classes.entered(name, mode, state)
+                if refs is not None:
+                    found.append((name, refs))
+                continue
             parameters = self._parameters[name]
             inside = [b for b, p in enumerate(parameters) if may_enter(mode, p, state)]
             if inside:
@@ -280,13 +327,21 @@ class ModeGraph:
         return name
 
     def indices(self, name: str, r: Any = None) -> list[int]:
-        """Positions in the class of mode ``name`` that ``r`` names; all of them for None."""
+        """Positions in the class of mode ``name`` that ``r`` names; all that are known for None."""
         mode = self._modes[name]
         if r is None:
             return list(range(len(self._parameters[name])))
         if isinstance(mode, Target):
             raise ModegraphError(f"target {name!r} has no references, but {r!r} was given")
+        if name in self._classes.regions:
+            p = mode.find(r)
+            assert p is not None
+            return [self._classes.position(name, p)]
         return [mode.match(r)]
+
+    def has_choice(self, name: str) -> bool:
+        """Whether a mode has more than one reference."""
+        return name in self._classes.regions or len(self._parameters[name]) > 1
 
     def parameter(self, node: Node) -> Parameter:
         """The reference of a node."""
@@ -297,22 +352,28 @@ class ModeGraph:
         return [(name, a) for name, p in self._parameters.items() for a in range(len(p))]
 
     def pair_verdicts(self) -> Mapping[tuple[Node, Node], Verdict]:
-        """The verdict of every ordered pair of different nodes."""
-        return MappingProxyType(self._verdicts)
+        """The verdict of every ordered pair of different nodes; of continuous classes, the certified pairs."""
+        found = dict(self._verdicts)
+        for i, j in {(s[0], t[0]): None for s, t in self._classes.links}:
+            found |= self._classes.pairs(i, j, self._parameters)
+        return MappingProxyType(found)
 
     def node_check(self, node: Node) -> Verdict:
         """The check of one mode under one reference."""
-        return self._checks[node]
+        return self._checks[(node[0], 0) if node[0] in self._classes.regions else node]
 
     def pair_switch(self, source: Node, target: Node) -> Switch:
         """The certified switch for one pair of references."""
-        v = self._verdicts[source, target]
+        continuous = self._classes.involves(source[0], target[0])
+        v = self._classes.verdict(source, target) if continuous else self._verdicts[source, target]
         pair = References([self.parameter(source)], [self.parameter(target)], [(0, 0)])
         return _switch_of(source[0], target[0], pair, v)
 
     @cached_property
     def _algorithm_1(self) -> tuple[tuple[Submode, ...], tuple[Edge, ...]]:
-        def verdicts(switch: Switch, cell: Cell) -> list[Case]:
+        def verdicts(switch: Switch, cell: Any) -> list[Case]:
+            if not isinstance(cell, Cell):
+                return [(None, None, self._class_verdict(switch.source, switch.target, None, None))]
             nodes = [((switch.source, a), (switch.target, b)) for a in cell.source_index for b in cell.target_index]
             return [(self.parameter(s), self.parameter(t), self._verdicts[s, t]) for s, t in nodes]
 
@@ -322,6 +383,9 @@ class ModeGraph:
     def _switch(self, i: str, j: str) -> Switch | None:
         if isinstance(self._modes[i], Target):
             return None
+        if self._classes.involves(i, j):
+            some = self._class_verdict(i, j, None, None)
+            return _switch_of(i, j, self.references(i, j), some) if some.status is Status.CERTIFIED else None
         pairs: dict[tuple[int, int], Verdict] = {}
         undecided = 0
         for a in self.indices(i):
@@ -357,7 +421,7 @@ class ModeGraph:
         return cases
 
 
-def _switch_of(i: str, j: str, references: References, v: Verdict) -> Switch:
+def _switch_of(i: str, j: str, references: References | ContinuousReferences, v: Verdict) -> Switch:
     if v.time is None:
         raise ValueError(f"the certified verdict {i} -> {j} has no time")
     return Switch(i, j, references, v.time, v.energy, v.margin, v.window)

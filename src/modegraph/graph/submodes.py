@@ -6,10 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from modegraph.certify.references import Cell, Parameter
+import numpy as np
+
+from modegraph.certify.continuous import ProductCell
+from modegraph.certify.references import Cell, Parameter, match_parameter
 from modegraph.certify.verdict import Verdict
 from modegraph.graph.aggregate import some_pair
 from modegraph.graph.switch import Switch
+from modegraph.model.sets import Box
 
 
 @dataclass(frozen=True)
@@ -31,11 +35,11 @@ class Submode:
     role: Literal["entry", "exit"]
     source: str
     target: str
-    cell: Cell
+    cell: Cell | ProductCell
 
     @property
-    def references(self) -> tuple[Parameter, ...]:
-        """The references ``mode`` may have in this submode."""
+    def references(self) -> tuple[Parameter, ...] | Box:
+        """The references ``mode`` may have in this submode; a Box of a continuous class."""
         return self.cell.source if self.role == "exit" else self.cell.target
 
     def __str__(self) -> str:
@@ -60,7 +64,9 @@ class Edge:
     verdict: Verdict | None = None
 
 
-CellVerdicts = Callable[[Switch, Cell], Sequence[tuple[Parameter, Parameter, Verdict]]]
+MOST_CELLS = 12
+"""Products that are cut out of one continuous R^ij."""
+CellVerdicts = Callable[[Switch, Cell | ProductCell], Sequence[tuple[Parameter, Parameter, Verdict]]]
 
 
 def algorithm_1(switches: Sequence[Switch], verdicts: CellVerdicts) -> tuple[list[Submode], list[Edge]]:
@@ -73,7 +79,7 @@ def algorithm_1(switches: Sequence[Switch], verdicts: CellVerdicts) -> tuple[lis
     edges: list[Edge] = []
     for switch in switches:
         i, j = switch.source, switch.target
-        for cell in switch.references.cells:
+        for cell in switch.references.cells[:MOST_CELLS]:
             leaving = Submode(i, "exit", i, j, cell)
             entering = Submode(j, "entry", i, j, cell)
             submodes += [leaving, entering]
@@ -85,6 +91,18 @@ def algorithm_1(switches: Sequence[Switch], verdicts: CellVerdicts) -> tuple[lis
     for submode in submodes:
         if submode.role == "entry":
             for leaving in exits.get(submode.mode, []):
-                if set(submode.cell.target_index) & set(leaving.cell.source_index):
+                if _meet(submode.cell, leaving.cell):
                     edges.append(Edge(submode, leaving, "stay"))
     return submodes, edges
+
+
+def _meet(entering: Cell | ProductCell, leaving: Cell | ProductCell) -> bool:
+    """Whether some reference of a mode is in both cells."""
+    if isinstance(entering, Cell) and isinstance(leaving, Cell):
+        return bool(set(entering.target_index) & set(leaving.source_index))
+    a, b = entering.target, leaving.source
+    if isinstance(a, Box) and isinstance(b, Box):
+        return bool((np.maximum(a.lo, b.lo) <= np.minimum(a.hi, b.hi)).all())
+    assert isinstance(a, tuple)
+    assert isinstance(b, tuple)
+    return any(match_parameter(a, p) is not None for p in b)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.references import References
 
 
@@ -15,7 +16,7 @@ class Switch:
     ----------
     source, target : str
         Mode names; ``target`` may be a Target.
-    references : References
+    references : References or ContinuousReferences
         The pairs (r_i, r_j) for which it is proved. The figures below hold for all of them.
     time : (float, float)
         Seconds after entering ``source``: no trajectory is in the target set before the first, every
@@ -31,7 +32,7 @@ class Switch:
 
     source: str
     target: str
-    references: References
+    references: References | ContinuousReferences
     time: tuple[float, float]
     energy: float | None = None
     margin: float | None = None

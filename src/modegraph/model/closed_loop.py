@@ -1,4 +1,4 @@
-"""The closed loop of one mode under one reference, traced to expressions."""
+"""The closed loop of one mode under one reference, or a continuous class of them, traced to expressions."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from itertools import pairwise
 from typing import Any
 
 from modegraph.errors import ModegraphError
-from modegraph.expression.array import TracedArray
 from modegraph.expression.ops import LOG, RECIP, WHERE
 from modegraph.expression.piecewise import resolve
 from modegraph.expression.scalar import Expr, Graph
 from modegraph.expression.trace import as_vector, call, required_arguments
 from modegraph.model.constraints import Face, faces_of
 from modegraph.model.mode import Mode
-from modegraph.model.numeric import require_finite_values
+from modegraph.model.numeric import require_finite_values, typical_values
 from modegraph.model.reference import Floats, Piece
 from modegraph.model.start import mode_start
 from modegraph.model.switching_times import jumps, switching_times
+from modegraph.model.traced_reference import TracedReference, fixed
 from modegraph.model.trajectory import at_instant
 from modegraph.model.validation import validate_modes
 
@@ -54,7 +54,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """All expressions of a mode under one reference, on one graph.
+    """All expressions of a mode under one reference, or under all of a continuous class, on one graph.
 
     Attributes
     ----------
@@ -66,10 +66,14 @@ class ClosedLoop:
         Variables w (q,).
     unknowns : dict[str, Expr]
         One variable for each unknown constant.
+    parameters : list[Expr]
+        Variables: the parameters of the references; empty for one reference.
     segments : list[Segment]
         Contiguous from t = 0 to ``inf``.
+    typical : (nvar, B) array
+        Values of states, time, disturbance, unknowns and parameters around the centre of the start set.
     reset : list[Expr]
-        Memory on entry (k,) as a function of the plant states.
+        Memory on entry (k,) as a function of the plant states and the parameters.
     """
 
     graph: Graph
@@ -78,7 +82,9 @@ class ClosedLoop:
     time: Expr
     disturbance: list[Expr]
     unknowns: dict[str, Expr]
+    parameters: list[Expr]
     segments: list[Segment]
+    typical: Floats
     reset: list[Expr]
     has_constraints: bool
 
@@ -86,6 +92,7 @@ class ClosedLoop:
 def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
     """Trace plant, controller, memory, constraints and output under the reference named p.
 
+    For a continuous class, p = None stands for all of it: the parameters are variables then.
     Segments end at the breakpoints of the reference, at its duration, and where the controller
     itself switches in time.
 
@@ -94,7 +101,9 @@ def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
     ModegraphError
         If a function of the mode is wrong. Names mode, function and remedy.
     """
-    p = mode.reference.parameters()[mode.match(p)]
+    p = mode.find(p, whole=True)
+    some = mode.reference.region.center if p is None and mode.reference.region is not None else p
+    start = mode_start(mode, some)
     trace = _Trace(mode, p)
     segments = [segment for piece in trace.pieces for segment in trace.segments(piece)]
     loop = ClosedLoop(
@@ -104,40 +113,14 @@ def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
         time=trace.time,
         disturbance=trace.w,
         unknowns=dict(trace.d),
+        parameters=trace.p,
         segments=segments,
+        typical=typical_values(mode, start, None if p is not None else mode.reference.region),
         reset=trace.reset(),
         has_constraints=mode.constraints is not None,
     )
-    require_finite_values(mode, p, mode_start(mode, p))
+    require_finite_values(mode, some, start)
     return loop
-
-
-def fixed(values: Any) -> TracedArray:
-    """A traced vector that the function it is handed to cannot change in place."""
-    array = TracedArray(values)
-    array.flags.writeable = False
-    return array
-
-
-class TracedReference(TracedArray):
-    """r while tracing: (m,) with ``.dot`` and ``.ddot``; a slice keeps the derivatives of what is left."""
-
-    dot: Any
-    ddot: Any
-
-    @classmethod
-    def of(cls, value: Any, dot: Any, ddot: Any) -> TracedReference:
-        """From three vectors of traced scalars."""
-        self = fixed(value).view(cls)
-        self.dot = fixed(dot)
-        self.ddot = fixed(ddot)
-        return self
-
-    def __getitem__(self, key: Any) -> Any:
-        part = self.view(TracedArray)[key]
-        if isinstance(part, TracedArray) and "ddot" in self.__dict__:
-            return TracedReference.of(part, self.dot[key], self.ddot[key])
-        return part
 
 
 class _Unknowns(dict[str, Expr]):
@@ -164,7 +147,10 @@ class _Trace:
         self.time = self._variable("t", taken)
         self.w = [self._variable(f"w[{k}]", taken) for k in range(mode.system.q)]
         self.d = _Unknowns((name, self._variable(f"d[{name!r}]", taken)) for name in mode.system.unknowns)
-        self.pieces = mode.reference.pieces(self.graph, self.time, p, self.owner)
+        region = mode.reference.region
+        whole = p is None and region is not None
+        self.p = [self._variable(f"p[{k}]", taken) for k in range(region.dim)] if region and whole else []
+        self.pieces = mode.reference.pieces(self.graph, self.time, self.p if whole else p, self.owner)
 
     def _variable(self, name: str, taken: set[str]) -> Expr:
         """A variable of its own, also where the user's names coincide ("t" may be a temperature)."""

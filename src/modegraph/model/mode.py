@@ -8,7 +8,7 @@ from typing import Any
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.model.memory import Memory
 from modegraph.model.names import require_callable, require_name
-from modegraph.model.reference import Reference, text_of
+from modegraph.model.reference import Floats, Reference, text_of
 from modegraph.model.sets import Set
 from modegraph.model.system import System
 from modegraph.model.trajectory import positive
@@ -111,13 +111,27 @@ class Mode:
         return self.system.states + (() if self.memory is None else self.memory.states)
 
     def label_of(self, p: object = None) -> str:
-        """The mode with one of its references, such as "hover(0.5, 1)"; the name alone for a singleton."""
+        """The mode with one of its references, such as "hover(0.5, 1)"; the name alone for a singleton or a class."""
+        if self.reference.region is not None:
+            return self.name + ("" if p is None else text_of(self.find(p)))
         known = self.reference.parameters()
         index = self.match(p)
         return self.name if len(known) == 1 else self.name + text_of(known[index])
 
+    def find(self, p: object = None, *, whole: bool = False) -> Floats | None:
+        """The parameters of a reference as a user names it; an error names the mode and what exists.
+
+        With ``whole``, None stands for all of a continuous class.
+        """
+        if whole and p is None and self.reference.region is not None:
+            return None
+        try:
+            return self.reference.find(p)
+        except ModegraphError as error:
+            raise ModegraphError(f"{self.label}: {error}") from None
+
     def match(self, p: object = None) -> int:
-        """Index of a reference as a user names it; an error names the mode and what exists."""
+        """Index of a reference of a finite class as a user names it; an error names the mode and what exists."""
         try:
             return self.reference.match(p)
         except ModegraphError as error:

@@ -10,7 +10,10 @@ import numpy as np
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
 from modegraph.model.reference import Floats
-from modegraph.model.sets import Set
+from modegraph.model.sets import Box, Set
+
+TYPICAL = 12
+"""Points at which sizes are compared."""
 
 
 def call_numeric(function: Callable[..., Any], available: Mapping[str, object], *, role: str, owner: str) -> Any:
@@ -76,6 +79,25 @@ def require_finite_values(mode: Mode, p: Floats | None, start: Set) -> None:
         values(memory.dynamics, {**seen, "u": u}, "memory dynamics", memory.k)
     if mode.output is not None:
         values(mode.output, {"x": x}, "output", None)
+
+
+def typical_values(mode: Mode, start: Set, region: Box | None) -> Floats:
+    """Values (nvar, B) around the centre of a start set: states, memory, time, disturbance, unknowns, parameters.
+
+    They only serve to compare sizes; ``region`` holds the parameters of a class.
+    """
+    rng = np.random.default_rng(3)
+    lo, hi = start.bounding_box()
+    centre = np.zeros(mode.dim)
+    spread = np.full(mode.dim, 0.1)
+    centre[: start.dim] = start.center
+    spread[: start.dim] = np.maximum(0.5 * (hi - lo), 0.1 * (1.0 + np.abs(start.center)))
+    constants = [*mode.system.unknowns.values(), *(zip(region.lo, region.hi, strict=True) if region else ())]
+    box = mode.system.disturbance
+    q = mode.system.q
+    low = np.concatenate([centre - spread, [0.0], np.zeros(q) if box is None else box.lo, [a for a, _ in constants]])
+    high = np.concatenate([centre + spread, [0.0], np.zeros(q) if box is None else box.hi, [b for _, b in constants]])
+    return low[:, None] + (high - low)[:, None] * rng.random((len(low), TYPICAL))
 
 
 def _finite_vector(result: Any, length: int | None, where: str, x: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""References a mode tracks: constants, finitely many of them, and what every reference can do."""
+"""References a mode tracks: constants, classes of them, and what every reference can do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.errors import ModegraphError
 from modegraph.model.sets import Box, Set
 from modegraph.model.sets.base import frozen, vector
 
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Side = Literal["left", "right"]
 
-CLASSES_LATER = (
-    "continuous reference classes (a Box of parameters) are not built yet; "
-    "list the values you need with mg.Points([...])"
-)
+MOST_PARAMETERS = 6
+"""Of a continuous class: each is a variable of the flowpipe."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +66,10 @@ class ReferenceValue(np.ndarray[Any, Any]):
 
 
 class Reference(ABC):
-    """A finite class of references r(t; p), t seconds since the mode was entered."""
+    """A class of references r(t; p), t seconds since the mode was entered: finite, or p in a box."""
 
+    region: Box | None = None
+    """The parameters of a continuous class; None where the class is finite."""
     duration: float
     """Seconds after which the value is held and the derivatives are zero."""
     breakpoints: tuple[float, ...]
@@ -87,11 +87,14 @@ class Reference(ABC):
 
     @abstractmethod
     def parameters(self) -> list[Floats | None]:
-        """The names of the references: one parameter vector each; None for the only one of its class."""
+        """The names of the references of a finite class: one parameter vector each; None for the only one."""
 
     @abstractmethod
-    def pieces(self, graph: Graph, time: Expr, p: Floats | None, owner: str) -> list[Piece]:
-        """Trace the reference named p; the last piece ends at ``inf``."""
+    def pieces(self, graph: Graph, time: Expr, p: Floats | list[Expr] | None, owner: str) -> list[Piece]:
+        """Trace the reference named p, or all of a continuous class: p then lists traced parameters.
+
+        The last piece ends at ``inf``.
+        """
 
     @abstractmethod
     def at(self, t: float, p: ArrayLike | None = None, side: Side = "right") -> ReferenceValue:
@@ -101,8 +104,33 @@ class Reference(ABC):
         """The value (m,) at time t, from the right at a jump, held after the duration."""
         return np.array(self.at(t, p))
 
+    def find(self, p: object = None) -> Floats | None:
+        """The parameters of one reference as a user names it; None for the only one of its class.
+
+        Raises
+        ------
+        ModegraphError
+            If there is no such reference; the message says what exists.
+        """
+        if self.region is None:
+            return self.parameters()[self.match(p)]
+        size = self.region.dim
+        within = f"{text_of(self.region.lo)} to {text_of(self.region.hi)}"
+        if p is None or (isinstance(p, Sequence | np.ndarray) and len(p) == 0):
+            raise ModegraphError(f"the references are a continuous class, {within}; name one of them")
+        try:
+            wanted = np.atleast_1d(np.asarray(p, dtype=float))
+        except (TypeError, ValueError):
+            raise ModegraphError(f"{p!r} names no reference; the class is {within}") from None
+        if wanted.shape != (size,):
+            numbers = "1 number" if size == 1 else f"{size} numbers"
+            raise ModegraphError(f"{p!r} names no reference; give {numbers} within {within}")
+        if not self.region.contains(wanted):
+            raise ModegraphError(f"{text_of(wanted)} names no reference; the class is {within}")
+        return frozen(wanted)
+
     def match(self, p: object = None) -> int:
-        """Index in :meth:`parameters` of a reference as a user names it.
+        """Index in :meth:`parameters` of a reference of a finite class as a user names it.
 
         None or () names the only reference of a singleton class.
 
@@ -164,13 +192,14 @@ class Points(Sequence[Floats]):
 
 
 class Setpoint(Reference):
-    """Constant references: one value, or those of a :class:`Points`. Made by :func:`setpoint`."""
+    """Constant references: one value, those of a :class:`Points`, or of a Box. Made by :func:`setpoint`."""
 
     duration = 0.0
     breakpoints = ()
 
-    def __init__(self, points: Points, given: object) -> None:
+    def __init__(self, points: Points | Box, given: object) -> None:
         self.points = points
+        self.region = points if isinstance(points, Box) else None
         self.given = given
 
     @property
@@ -182,16 +211,23 @@ class Setpoint(Reference):
         return True
 
     def parameters(self) -> list[Floats | None]:
+        if isinstance(self.points, Box):
+            raise ModegraphError("a continuous class of references cannot be listed; name one by its parameters")
         return list(self.points)
 
-    def pieces(self, graph: Graph, time: Expr, p: Floats | None, owner: str) -> list[Piece]:
-        value = [graph.constant(float(v)) for v in self.points[self.match(p)]]
+    def pieces(self, graph: Graph, time: Expr, p: Floats | list[Expr] | None, owner: str) -> list[Piece]:
+        value = p if isinstance(p, list) else [graph.constant(float(v)) for v in self._value(p)]
         zero = [graph.constant(0)] * self.dim
         return [Piece(0.0, math.inf, value, zero, zero)]
 
     def at(self, t: float, p: ArrayLike | None = None, side: Side = "right") -> ReferenceValue:
-        value = self.points[self.match(p)]
+        value = self._value(p)
         return ReferenceValue(value, np.zeros(self.dim), np.zeros(self.dim), value)
+
+    def _value(self, p: object) -> Floats:
+        value = self.find(p)
+        assert value is not None
+        return value
 
     def __repr__(self) -> str:
         return f"setpoint({self.given!r})"
@@ -206,19 +242,21 @@ def setpoint(value: ArrayLike | Points | Box) -> Setpoint:
         One constant reference (m,).
     value : Points
         Finitely many.
+    value : Box
+        Every value in it (a continuous class): at most six coordinates.
 
     Raises
     ------
-    NotBuiltYet
-        For a Box, a continuous class.
+    ModegraphError
+        If it is nothing of the kind.
     """
     if isinstance(value, Points):
         return Setpoint(value, value)
     if isinstance(value, Box):
-        raise NotBuiltYet(f"setpoint: {CLASSES_LATER}")
+        return Setpoint(parameter_box(value, "setpoint"), value)
     if isinstance(value, Set):
         raise ModegraphError(
-            f"setpoint takes reference values, not a {type(value).__name__}; pass an array or Points([...])"
+            f"setpoint takes reference values, not a {type(value).__name__}; pass an array, Points([...]) or a Box"
         )
     if isinstance(value, Reference) or callable(value):
         raise ModegraphError(
@@ -232,6 +270,16 @@ def setpoint(value: ArrayLike | Points | Box) -> Setpoint:
     if np.size(value) == 0:
         raise ModegraphError("setpoint: the reference is empty; give at least one value")
     return Setpoint(Points([vector(value, "setpoint: value")]), value)
+
+
+def parameter_box(box: Box, what: str) -> Box:
+    """The box, if it has few enough parameters; ``what`` opens the error."""
+    if box.dim > MOST_PARAMETERS:
+        raise ModegraphError(
+            f"{what}: a continuous class has at most {MOST_PARAMETERS} parameters, this Box has {box.dim}; "
+            "fix the others, or list the references with mg.Points([...])"
+        )
+    return box
 
 
 def text_of(p: ArrayLike | None) -> str:

@@ -12,14 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.errors import ModegraphError
 from modegraph.model.names import require_callable
-from modegraph.model.reference import CLASSES_LATER, Floats, Piece, Points, Reference, ReferenceValue, Side
+from modegraph.model.reference import Floats, Piece, Points, Reference, ReferenceValue, Side, parameter_box
 from modegraph.model.sets import Box
 
 if TYPE_CHECKING:
     from modegraph.expression.evaluate import Evaluator
     from modegraph.expression.scalar import Expr, Graph
+
+
+KEPT = 64
+"""References of a continuous class whose evaluators are kept."""
 
 
 class Trajectory(Reference):
@@ -29,40 +33,46 @@ class Trajectory(Reference):
         self,
         signal: Callable[..., Any],
         duration: float,
-        over: Points | None,
+        over: Points | Box | None,
         breakpoints: tuple[float, ...],
     ) -> None:
         self.signal = signal
         self.duration = duration
         self.over = over
+        self.region = over if isinstance(over, Box) else None
         self.breakpoints = breakpoints
-        self._tables: dict[int, list[tuple[Piece, Evaluator]]] = {}
+        self._tables: dict[bytes, list[tuple[Piece, Evaluator]]] = {}
 
     @cached_property
     def dim(self) -> int:
-        return len(self._table(0)[0][0].value)
+        some = self.parameters()[0] if self.region is None else self.region.center
+        return len(self._table(some)[0][0].value)
 
     @property
     def is_constant(self) -> bool:
         return False
 
     def parameters(self) -> list[Floats | None]:
+        if isinstance(self.over, Box):
+            raise ModegraphError("a continuous class of references cannot be listed; name one by its parameters")
         return [None] if self.over is None else list(self.over)
 
-    def pieces(self, graph: Graph, time: Expr, p: Floats | None, owner: str) -> list[Piece]:
+    def pieces(self, graph: Graph, time: Expr, p: Floats | list[Expr] | None, owner: str) -> list[Piece]:
         """Trace the signal once and resolve it between breakpoints.
 
         The held value is the last piece at t = duration exactly, a constant expression.
         """
+        from modegraph.expression.array import TracedArray
         from modegraph.expression.derivative import derivative
         from modegraph.expression.piecewise import resolve
         from modegraph.expression.simplify import simplify
         from modegraph.expression.trace import as_vector, call
 
-        p = self.parameters()[self.match(p)]
         available: dict[str, object] = {"t": time}
-        if p is not None:
-            available["p"] = np.array(p)
+        if isinstance(p, list):
+            available["p"] = TracedArray(p)
+        elif (own := self.find(p)) is not None:
+            available["p"] = np.array(own)
         value = call(self.signal, available, role="signal", owner=owner)
         traced = as_vector(value, None, role="signal", owner=owner, graph=graph)
         if not traced:
@@ -88,28 +98,30 @@ class Trajectory(Reference):
     def at(self, t: float, p: ArrayLike | None = None, side: Side = "right") -> ReferenceValue:
         if not t >= 0:
             raise ModegraphError(f"a reference starts at t = 0, there is no value at t = {t}")
-        index = self.match(p)
-        table = self._table(index)
-        for piece, evaluate in table:
+        own = self.find(p)
+        for piece, evaluate in self._table(own):
             if t < piece.end or (side == "left" and t == piece.end):
                 value, dot, ddot = evaluate(np.array([float(t)])).reshape(3, -1)
-                return ReferenceValue(value, dot, ddot, self.parameters()[index])
+                return ReferenceValue(value, dot, ddot, own)
         raise AssertionError("the last piece has no end")
 
-    def _table(self, index: int) -> list[tuple[Piece, Evaluator]]:
+    def _table(self, p: Floats | None) -> list[tuple[Piece, Evaluator]]:
         """Pieces of one reference with float evaluators, traced on a graph of their own."""
-        if index not in self._tables:
+        name = b"" if p is None else p.tobytes()
+        if name not in self._tables:
             from modegraph.expression.evaluate import Evaluator
             from modegraph.expression.scalar import Graph
             from modegraph.expression.tape import compile_tape
 
             graph = Graph()
             time = graph.variable("t")
-            pieces = self.pieces(graph, time, self.parameters()[index], "trajectory")
-            self._tables[index] = [
+            pieces = self.pieces(graph, time, p, "trajectory")
+            while self.region is not None and len(self._tables) >= KEPT:
+                self._tables.pop(next(iter(self._tables)), None)
+            self._tables[name] = [
                 (piece, Evaluator(compile_tape([*piece.value, *piece.dot, *piece.ddot], [time]))) for piece in pieces
             ]
-        return self._tables[index]
+        return self._tables[name]
 
     def __repr__(self) -> str:
         name = getattr(self.signal, "__name__", type(self.signal).__name__)
@@ -138,22 +150,22 @@ def trajectory(
         ``np.where(t < b, ...)`` with b among the breakpoints.
     duration : float
         Seconds, > 0; the same for all p.
-    over : Points, optional
-        Values of the parameter vector p.
+    over : Points or Box, optional
+        Values of the parameter vector p: finitely many, or all of a box (at most six parameters).
     breakpoints : sequence of float
         Instants in [0, duration] where the signal has a kink or a jump.
 
     Raises
     ------
-    NotBuiltYet
-        If ``over`` is a Box, a continuous class.
+    ModegraphError
+        If an argument is wrong; names the remedy.
     """
     require_callable(signal, "trajectory: signal")
     length = positive(duration, "trajectory: duration")
     if isinstance(over, Box):
-        raise NotBuiltYet(f"trajectory: {CLASSES_LATER}")
-    if over is not None and not isinstance(over, Points):
-        raise ModegraphError(f"trajectory: over must be Points([...]), got {type(over).__name__}")
+        over = parameter_box(over, "trajectory: over")
+    if over is not None and not isinstance(over, Points | Box):
+        raise ModegraphError(f"trajectory: over must be Points([...]) or a Box, got {type(over).__name__}")
     try:
         instants = [float(b) for b in breakpoints]
     except (TypeError, ValueError):

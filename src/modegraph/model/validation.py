@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from modegraph.errors import ModegraphError
+from modegraph.model.class_start import class_start
 from modegraph.model.mode import Mode
 from modegraph.model.start import mode_start
 from modegraph.model.target import Target
@@ -43,6 +44,9 @@ def validate_modes(modes: Iterable[Mode | Target]) -> tuple[Mode | Target, ...]:
                 f"{real[0].system.n} states ({', '.join(real[0].system.states)}); give one for each state"
             )
     for mode in real:
+        if mode.reference.region is not None:
+            class_start(mode)
+            continue
         for p in mode.reference.parameters():
             mode_start(mode, p)
     return listed

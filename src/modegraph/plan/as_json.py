@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from modegraph.certify.continuous import ContinuousReferences, Side
 from modegraph.certify.references import References
 from modegraph.certify.verdict import Verdict
 from modegraph.graph.switch import Switch
+from modegraph.model.sets import Box
 
 if TYPE_CHECKING:
     from modegraph.plan.plan import Plan
@@ -62,9 +64,19 @@ def verdict_data(v: Verdict) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def references_data(refs: References) -> list[list[Any]]:
-    """The certified pairs ``[r_i, r_j]``."""
+CELLS = 12
+"""Products listed of a continuous R^ij, the largest."""
+
+
+def references_data(refs: References | ContinuousReferences) -> Any:
+    """The certified pairs ``[r_i, r_j]``; of continuous classes some certified products of boxes."""
+    if isinstance(refs, ContinuousReferences):
+        return {"cells": [{"source": _side(c.source), "target": _side(c.target)} for c in refs.cells[:CELLS]]}
     return [[r_i, r_j] for r_i, r_j in refs]
+
+
+def _side(side: Side) -> Any:
+    return {"lo": side.lo, "hi": side.hi} if isinstance(side, Box) else list(side)
 
 
 def switch_data(s: Switch) -> dict[str, Any]:

@@ -9,10 +9,11 @@ from fractions import Fraction
 from numbers import Real
 from typing import Any
 
+from modegraph.certify.references import Parameter
 from modegraph.certify.verdict import Verdict
-from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.errors import ModegraphError
 
-NAMES = ("switches", "time", "energy", "margin")
+NAMES = ("switches", "time", "energy", "margin", "distance")
 WEIGHED = ("switches", "time", "energy")
 
 Cost = tuple[int, Fraction]
@@ -33,15 +34,20 @@ class Objective:
         For "switches", "time" (latest, seconds) and "energy"; empty for "margin".
     bottleneck : bool
         Maximise the smallest margin instead of a sum.
+    travelled : bool
+        The distance between the references of each switch, where they have the same size.
     """
 
     name: str
     weights: Mapping[str, Fraction]
     bottleneck: bool = False
+    travelled: bool = False
 
-    def cost(self, verdict: Verdict) -> Cost:
+    def cost(self, verdict: Verdict, r_i: Parameter = None, r_j: Parameter = None) -> Cost:
         """The cost of one certified switch; a switch without an energy bound costs an infinity."""
         infinite, total = 0, Fraction(0)
+        if self.travelled:
+            total += _distance(r_i, r_j)
         for what, weight in self.weights.items():
             if weight == 0:
                 continue
@@ -51,6 +57,13 @@ class Objective:
             else:
                 total += weight * amount
         return infinite, total
+
+
+def _distance(r_i: Parameter, r_j: Parameter) -> Fraction:
+    """Euclidean distance in reference space; between references of different size there is none to go."""
+    if r_i is None or r_j is None or len(r_i) != len(r_j):
+        return Fraction(0)
+    return Fraction(math.dist(r_i, r_j))
 
 
 def objective(minimize: Any) -> Objective:
@@ -63,8 +76,6 @@ def objective(minimize: Any) -> Objective:
     """
     if isinstance(minimize, Mapping):
         return _weighted(minimize)
-    if minimize == "distance":
-        raise NotBuiltYet("plan: minimize='distance' is not built yet; use " + ", ".join(map(repr, NAMES)))
     if not isinstance(minimize, str) or minimize not in NAMES:
         raise ModegraphError(
             f"plan: minimize={minimize!r} is unknown; use {', '.join(map(repr, NAMES))} "
@@ -72,6 +83,8 @@ def objective(minimize: Any) -> Objective:
         )
     if minimize == "margin":
         return Objective("margin", {}, bottleneck=True)
+    if minimize == "distance":
+        return Objective("distance", {}, travelled=True)
     return Objective(minimize, {minimize: Fraction(1)})
 
 

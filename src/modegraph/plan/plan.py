@@ -147,7 +147,7 @@ class Plan:
         chosen = [
             f"{name} {parameter_text(r)}"
             for name, r in zip(self.modes, self.references, strict=True)
-            if len(self.graph.indices(name)) > 1
+            if self.graph.has_choice(name)
         ]
         if chosen:
             lines.append("  references: " + ", ".join(chosen))

@@ -12,6 +12,7 @@ from modegraph.errors import ModegraphError
 from modegraph.graph.entry import may_enter, plain_state
 from modegraph.graph.modegraph import Node
 from modegraph.model.target import Target
+from modegraph.plan.candidates import propose
 from modegraph.plan.objectives import Objective, latest, objective
 from modegraph.plan.plan import Plan
 from modegraph.plan.search import Arc, Path, Problem, best_paths
@@ -59,6 +60,9 @@ def plans(
     goal_name = graph.name_of(goal)
     goals = frozenset((goal_name, b) for b in graph.indices(goal_name, r_goal))
     state = None if x0 is None else plain_state(x0, graph.dimension)
+    if graph.regions:
+        propose(graph, None if start is None else graph.name_of(start), goal_name, r_start, r_goal, state)
+        goals = frozenset((goal_name, b) for b in graph.indices(goal_name, r_goal))
     problem = Problem(
         order=_order(graph),
         arcs=_arcs(graph, wanted),
@@ -91,7 +95,8 @@ def _arcs(graph: ModeGraph, wanted: Objective) -> dict[Node, list[Arc]]:
     for (source, target), v in graph.pair_verdicts().items():
         if v.status is Status.CERTIFIED:
             margin = 0.0 if v.margin is None else v.margin
-            arc = Arc(source, target, wanted.cost(v), Fraction(latest(v)), margin)
+            cost = wanted.cost(v, graph.parameter(source), graph.parameter(target))
+            arc = Arc(source, target, cost, Fraction(latest(v)), margin)
             arcs.setdefault(source, []).append(arc)
     return arcs
 

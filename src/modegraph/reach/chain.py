@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -17,7 +19,11 @@ from .start import Piece
 class Chain:
     """Flows of one piece; each but the first continues from an enclosure of the end of the one before."""
 
-    def __init__(self, compiled: CompiledMode, framed: Sequence[Field], piece: Piece, order: Order) -> None:
+    def __init__(
+        self, compiled: CompiledMode, framed: Sequence[Field], piece: Piece, order: Order, deadline: float = math.inf
+    ) -> None:
+        """``deadline``: instant of ``time.monotonic()`` at which it stops where it is."""
+        self.deadline = deadline
         self.piece = piece
         self.order = order
         self.framed = framed
@@ -37,6 +43,9 @@ class Chain:
             if give_up is not None and give_up(self):
                 return True
             flow = self.flows[-1]
+            if time.monotonic() > self.deadline:
+                self.failure = f"at t = {flow.time:.6g} s the budget ended; give more, or shorten the horizon"
+                return False
             if not flow.advance(end):
                 self.failure = str(flow.failure)
                 self._drop_unbounded()

@@ -1,4 +1,4 @@
-"""A mode under one reference, traced and compiled for the engine."""
+"""A mode under one reference, or a continuous class of them, traced and compiled for the engine."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ModegraphError
 from ..expression.evaluate import Evaluator
 from ..expression.tape import Tape, compile_tape
+from ..model.class_start import StartClass, class_start
 from ..model.closed_loop import ClosedLoop, close_loop, mode_start
 from ..model.mode import Mode
 from ..model.sets import Set
+from .class_chart import class_chart
 from .field import Field, Frame, compile_field, disturbance_box
 from .parallelotope import slow_and_fast_axes
 from .start import Piece, whole
@@ -22,15 +25,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CompiledMode:
-    """A mode under one reference, ready for the engine."""
+    """A mode under one reference, or under a continuous class of them, ready for the engine."""
 
     loop: ClosedLoop
     fields: list[Field]
-    start: Set
+    start: Set | StartClass
     reset: Tape | None
     w_centre: Floats
     w_radius: Floats
     unknowns: dict[str, tuple[float, float]]
+    parameters: list[tuple[float, float]]
+    """Ranges of the parameters of a continuous class; empty for one reference."""
     stops: Sequence[float]
 
     @property
@@ -41,6 +46,12 @@ class CompiledMode:
     def linear(self) -> bool:
         """Jacobian and disturbance matrix are constant on every segment."""
         return all(f.linear for f in self.fields)
+
+    @property
+    def flat(self) -> bool:
+        """States are affine in starts, disturbance and unknowns together: linear, also in how all enter."""
+        curved = isinstance(self.start, StartClass) and not self.start.is_affine
+        return all(f.flat for f in self.fields) and not curved
 
     def framed_fields(self) -> list[Field]:
         """The fields in the modes of the loop, where a disturbance meets a nonlinear loop."""
@@ -59,12 +70,23 @@ class CompiledMode:
         x = np.zeros(n)
         centre = np.asarray(self.start.center, float)
         x[: len(centre)] = centre
-        d = [0.5 * (lo + hi) for lo, hi in self.unknowns.values()]
+        d = [0.5 * (lo + hi) for lo, hi in [*self.unknowns.values(), *self.parameters]]
         at = np.concatenate([x, [fld.start], self.w_centre, d])[:, None]
         return np.asarray(Evaluator(fld.jacobian)(at)[: n * n, 0].reshape(n, n))
 
     def whole(self) -> Piece:
-        return whole(self.start, list(self.unknowns.values()))
+        ranges = [*self.unknowns.values(), *self.parameters]
+        if not isinstance(self.start, StartClass):
+            return whole(self.start, ranges, len(self.parameters))
+        lo, hi = (np.array(side, float) for side in zip(*ranges, strict=True))
+        return Piece.whole(class_chart(self.start, lo, hi))
+
+    @property
+    def one_start(self) -> Set:
+        """The start set, of a mode under one reference."""
+        if isinstance(self.start, StartClass):
+            raise ModegraphError("this needs one reference of the class; name it by its parameters")
+        return self.start
 
     @property
     def own_reset(self) -> Tape | None:
@@ -73,30 +95,34 @@ class CompiledMode:
 
 
 def compile_reset(loop: ClosedLoop) -> Tape | None:
-    """The memory on entry as a function of the plant states."""
+    """The memory on entry as a function of the plant states, and of the parameters of a class."""
     if not loop.reset:
         return None
-    return compile_tape(loop.reset, loop.states[: len(loop.states) - len(loop.reset)])
+    return compile_tape(loop.reset, [*loop.states[: len(loop.states) - len(loop.reset)], *loop.parameters])
 
 
 def compile_mode(mode: Mode, p: Floats | None, start: Set | None = None, *, observed: bool = True) -> CompiledMode:
     """Trace and compile a mode; raises `ModegraphError` where the model is wrong.
 
-    Without ``observed``, the states alone are followed: no constraints, inputs or tracking errors.
+    For a continuous class of references, p = None stands for all of it. Without ``observed``, the states alone
+    are followed: no constraints, inputs or tracking errors.
     """
     loop = close_loop(mode, p)
     if not observed:
         bare = [replace(segment, constraints=[], inputs=[], tracking=[]) for segment in loop.segments]
         loop = replace(loop, segments=bare)
+    region = mode.reference.region if loop.parameters else None
+    starts = start if start is not None else mode_start(mode, p) if region is None else class_start(mode)
     centre, radius = disturbance_box(mode.system.disturbance)
     unknowns = {name: (float(lo), float(hi)) for name, (lo, hi) in (mode.system.unknowns or {}).items()}
     return CompiledMode(
         loop=loop,
         fields=[compile_field(loop, segment) for segment in loop.segments],
-        start=mode_start(mode, p) if start is None else start,
+        start=starts,
         reset=compile_reset(loop),
         w_centre=centre,
         w_radius=radius,
         unknowns=unknowns,
+        parameters=[] if region is None else list(zip(region.lo.tolist(), region.hi.tolist(), strict=True)),
         stops=[],
     )

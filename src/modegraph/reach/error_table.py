@@ -26,14 +26,15 @@ class ErrorTable:
 
 
 @lru_cache(maxsize=64)
-def _error_table(m: int, q: int, n: int) -> ErrorTable:
+def _error_table(weights: tuple[int, ...], q: int, n: int) -> ErrorTable:
     order = max(q, 1)
-    table = monomials((1,) * m + (1 if order <= 3 else 2,) * n, order)
+    m = len(weights)
+    table = monomials(weights + (1 if order <= 3 else 2,) * n, order)
     owner = np.full(table.size, SET_VARIABLE, np.int64)
     owner[table.degree > q] = DROPPED
     for v in range(n):
         owner[table.exponents[:, m + v] > 0] = v
-    plain = monomials((1,) * m, order)
+    plain = monomials(weights, order)
     index = {tuple(e): k for k, e in enumerate(table.exponents.tolist())}
     count = int(plain.start[q + 1])
     embed = np.array([index[(*e, *(0,) * n)] for e in plain.exponents[:count].tolist()], np.int64)
@@ -42,4 +43,4 @@ def _error_table(m: int, q: int, n: int) -> ErrorTable:
 
 def error_table(table: Monomials, q: int, n: int) -> ErrorTable:
     """The Jacobian's table for a flowpipe over ``table`` with Psi and G of degree q, n states."""
-    return _error_table(table.variables, q, n)
+    return _error_table(table.weights, q, n)

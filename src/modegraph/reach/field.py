@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..expression.derivative import derivative
 from ..expression.ops import CONST, LOG, RECIP, VAR, WHERE
+from ..expression.residual import residual
 from ..expression.scalar import Expr, Graph
 from ..expression.simplify import simplify
 from ..expression.tape import Tape, compile_tape
@@ -28,7 +29,7 @@ class Field:
     """x' = f(x, t, w, d) on one segment of the reference, with what is observed along it.
 
     Variables of all tapes, in order: states (plant, then memory; in the frame's coordinates where there
-    is a frame), time, disturbance, unknowns.
+    is a frame), time, disturbance, unknowns, among them last the parameters of a class of references.
 
     Attributes
     ----------
@@ -48,6 +49,8 @@ class Field:
         Jacobian and disturbance matrix are constant.
     steady : bool
         The Jacobian is constant.
+    flat : bool
+        f is affine in states, disturbance and unknowns together.
     full_w : bool
         f is not affine in the disturbance.
     autonomous : bool
@@ -59,7 +62,7 @@ class Field:
     states: int
     frame: Frame | None
     disturbances: int
-    unknowns: tuple[str, ...]
+    unknowns: int
     rates: Tape
     jacobian: Tape
     observed: Tape
@@ -67,6 +70,7 @@ class Field:
     outputs: int
     linear: bool
     steady: bool
+    flat: bool
     full_w: bool
     autonomous: bool
     reads: tuple[frozenset[int], ...]
@@ -88,7 +92,7 @@ class Field:
 
     @property
     def variables(self) -> int:
-        return self.first_d + len(self.unknowns)
+        return self.first_d + self.unknowns
 
 
 @dataclass(frozen=True)
@@ -168,7 +172,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
     """Trace -> simplify -> differentiate -> tapes, for one segment, in the coordinates of a frame."""
     graph = loop.graph
     states, disturbance = list(loop.states), list(loop.disturbance)
-    unknowns = list(loop.unknowns.values())
+    unknowns = [*loop.unknowns.values(), *loop.parameters]
     variables = [*states, loop.time, *disturbance, *unknowns]
     written = list(segment.rhs)
     n, nw = len(states), len(disturbance)
@@ -180,6 +184,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         at_zero = graph.rewrite([e.index for e in written], known={w.index: zero for w in disturbance})
         parts = [Expr(graph, k) for k in at_zero] + [e for row in by_w for e in row]
         parts = simplify(parts, seconds=SIMPLIFY_SECONDS).exprs
+        parts[:n] = residual(parts[:n], variables, loop.typical, unknowns, seconds=SIMPLIFY_SECONDS)
         rates = []
         for i in range(n):
             rate = parts[i]
@@ -189,6 +194,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         by_w = [parts[n + i * nw : n + (i + 1) * nw] for i in range(n)]
     else:
         rates = simplify(written, seconds=SIMPLIFY_SECONDS).exprs
+        rates = residual(rates, variables, loop.typical, unknowns, seconds=SIMPLIFY_SECONDS)
         by_w = derivative(rates, disturbance) if nw else by_w
     obligations += _obligations(graph, [*graph.dropped, *(e.index for e in rates)])
     unique = [Expr(graph, k) for k in dict.fromkeys(obligations)]
@@ -212,13 +218,14 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
     jacobian = [e for row in by_x for e in row] + [e for row in by_w for e in row]
     roots = [e.index for row in (*by_x, *by_w) for e in row]
     linear = all(graph.nodes[k].op == CONST for k in roots)
+    by_unknown = derivative(rates, unknowns) if linear and unknowns else []
     return Field(
         start=segment.start,
         end=segment.end,
         states=n,
         frame=frame,
         disturbances=nw,
-        unknowns=tuple(loop.unknowns),
+        unknowns=len(unknowns),
         rates=compile_tape(rates, variables),
         jacobian=compile_tape([*jacobian, *unique], variables),
         observed=compile_tape(observed, variables),
@@ -226,6 +233,7 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         outputs=len(segment.tracking),
         linear=linear and not unique,
         steady=all(graph.nodes[k].op == CONST for k in roots[: n * n]),
+        flat=linear and not any(e.depends_on([*states, *disturbance, *unknowns]) for row in by_unknown for e in row),
         full_w=bool(nw) and not affine,
         autonomous=not any(e.depends_on([loop.time]) for e in [*rates, *faces, *unique]),
         reads=tuple(frozenset(k for k in range(n) if rate.depends_on([states[k]])) for rate in rates),

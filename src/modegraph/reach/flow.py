@@ -21,6 +21,7 @@ from ..enclosure.step import (
 )
 from ..expression.tape import Tape
 from .bounds import PolynomialBounds
+from .class_chart import start_polynomials
 from .error_table import error_table
 from .field import Field
 from .framing import generator_box, into_frame, out_of_frame, thinned
@@ -28,6 +29,7 @@ from .grid import next_instant
 from .pointwise import evaluate_over, workspace
 from .records import Failure, Order, Step
 from .start import Piece
+from .step_control import feeding_cap
 
 Floats = NDArray[np.float64]
 
@@ -99,7 +101,7 @@ class Flow:
         self.order = order
         self.names = list(names)
         self.w_centre, self.w_radius = w_centre, w_radius
-        self.table: Monomials = monomials((1,) * piece.variables, order.degree)
+        self.table: Monomials = monomials(order.weights or (1,) * piece.variables, order.degree)
         q = min(order.jacobian, order.degree)
         self.small = int(self.table.start[q + 1])
         self.q = q
@@ -120,7 +122,7 @@ class Flow:
         self.bounds = PolynomialBounds(piece, self.table, self.table.size)
         seen = int(self.table.start[self.seen + 1])
         self.seen_bounds = PolynomialBounds(piece, self.table, seen)
-        p, unknowns, slack = piece.polynomials(self.table.linear, self.table.size)
+        p, unknowns, slack = start_polynomials(piece, self.table)
         self._unknowns = unknowns
         self._errors = error_table(self.table, self.q, n)
         self._spaces: dict[tuple[int, str], dict[str, Any]] = {}
@@ -130,7 +132,10 @@ class Flow:
             fall = np.array([0, 0, 0, 1, 1, 2, 2, 2, 2])
             self._cut = np.maximum(order.degree - fall, 2).astype(np.int64)
         G = np.zeros((0, n, self.small))
-        self.undefined_start = False
+        if not np.isfinite(slack).all():
+            what = "the start set cannot be enclosed over so large a part of the class"
+            self.failure = Failure(0.0, what, "make the class smaller")
+            slack = np.zeros(len(slack))
         if reset is not None and p.shape[0] < n:
             p, slack = self._with_memory(p, slack, reset)
         self.frame = self.fields[0].frame
@@ -157,6 +162,8 @@ class Flow:
         k = len(reset.outputs)
         inputs = np.zeros((len(reset.variables), self.table.size))
         inputs[: len(p)] = p
+        parameters = len(inputs) - len(p)
+        inputs[len(p) :] = self._unknowns[len(self._unknowns) - parameters :]
         radius = np.zeros(len(reset.variables))
         radius[: len(p)] = slack
         z, off, bad = self.evaluate(reset, inputs, radius)
@@ -191,7 +198,11 @@ class Flow:
             return np.zeros(0)
         inputs, radius = self.variables_at(t, p, G, fld)
         value, off, _ = self.evaluate(fld.observed, inputs, radius)
-        return np.asarray(self.bounds.upper(value[: len(fld.faces)]) + off[: len(fld.faces)])
+        faces = value[: len(fld.faces)]
+        upper = self.bounds.upper(faces)
+        for i in np.flatnonzero((upper + off[: len(faces)] > 0.0) & np.isfinite(off[: len(faces)])):
+            upper[i] = min(upper[i], self.bounds.refined_upper(faces[i], -float(off[i])))
+        return np.asarray(upper + off[: len(faces)])
 
     # -- stepping --------------------------------------------------------------------------------
 
@@ -243,7 +254,7 @@ class Flow:
                 if caps < 0.5 and h > 1e-4:
                     h_try = h * caps
                     continue
-                factor = min(factor, caps)
+                factor = min(factor, caps, feeding_cap(self.piece, outcome))
                 seen = self._observe(fld, h, tube)
                 look = shortened < SHORTER_LOOKS and h > 1e-6 and not (seen[0] <= 0.0).all()
                 # Between the ends a constraint is bounded through its bend: try a shorter look.

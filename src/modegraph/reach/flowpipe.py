@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -19,29 +20,19 @@ from ..model.sets import Box, Set
 from .chain import Chain, nonlinear_variable
 from .compiled import CompiledMode, compile_mode
 from .field import Field
-from .flow import Order, generator_box
+from .flow import Order
+from .ladder import class_orders, is_light, orders
+from .looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
+from .restrictor import Restrictor
 from .slices import Slice, Slicer, hull
 from .start import Piece
 
 Floats = NDArray[np.float64]
 
-LADDER = ((3, 1), (4, 3), (6, 3), (8, 4), (10, 4))
-"""Degrees of p and of the Jacobian flow; higher ones are tried where lower ones are loose or break down."""
-LIGHT_MONOMIALS, MOST_LIGHT = 130, 8
-"""The first degree tried is the highest with at most so many monomials, up to this: they cost nothing."""
-MOST_MONOMIALS, MOST_GENERATOR_MONOMIALS = 500, 100
-MOST_HEAVY_MONOMIALS = 2000
-"""A degree with more than the first number is tried only where one below is complete but very loose."""
-MOST_DISTURBED = 6
-"""Highest degree with a disturbance: there the remainder is what the disturbance adds."""
-LOOSE = 5e-3
-"""Share of the remainder in the width of the last set above which a higher degree is tried."""
-GIVE_UP = 0.02
-"""The same share, above which a run of low degree is given up for the next one: it seldom falls again."""
-VERY_LOOSE = 0.25
-"""The same share, above which even a degree with many monomials is tried."""
 MOST_PIECES = 32
 DEEPEST_CUT = 7
+MOST_LOOSE_PIECES, WORTH_CUTTING = 8, 0.8
+"""A class of references that is very loose is cut into at most so many, while halves are by this much tighter."""
 PROGRESS = 1.05
 """A cut or a higher degree must get this much further, or it is the last one."""
 DEFAULT_HORIZON = 10.0
@@ -49,7 +40,7 @@ DEFAULT_HORIZON = 10.0
 
 
 class Flowpipe:
-    """An enclosure of all trajectories of one mode under one reference. Made by :func:`flowpipe`.
+    """An enclosure of all trajectories of one mode under one reference, or a class of them. Made by :func:`flowpipe`.
 
     Attributes
     ----------
@@ -67,13 +58,22 @@ class Flowpipe:
         Parts the start set was cut into, and validated steps of all of them.
     """
 
-    def __init__(self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str) -> None:
+    def __init__(
+        self,
+        label: str,
+        states: Sequence[str],
+        horizon: float,
+        chains: Sequence[Chain],
+        stuck: str,
+        one_of: Restrictor | None,
+    ) -> None:
         self.states = tuple(states)
+        self._one_of = one_of
         self.horizon = horizon
         self.complete = not any(chain.failure for chain in chains)
         self._label = label
         self._parts = [[Slicer(flow) for flow in chain.flows] for chain in chains]
-        self._boxes: dict[tuple[float, float], Box] = {}
+        self._boxes: dict[tuple[float, float, bytes], Box] = {}
         begun = all(chain.begun for chain in chains)
         until = min(chain.time for chain in chains)
         instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
@@ -87,31 +87,47 @@ class Flowpipe:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
             self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
 
-    def at(self, t: float) -> Box:
+    def at(self, t: float, r: ArrayLike | None = None) -> Box:
         """Box over states, then memory, around every state that is possible at time t (seconds).
 
+        Parameters
+        ----------
+        r : (k,) array, optional
+            One reference of a continuous class; without it, all of them count.
+
         Raises
         ------
         ModegraphError
-            Before 0 or past the computed time.
+            Before 0 or past the computed time, or if r is not of the class.
         """
-        return self.hull(t, t)
+        return self.hull(t, t, r)
 
-    def hull(self, t0: float, t1: float) -> Box:
+    def hull(self, t0: float, t1: float, r: ArrayLike | None = None) -> Box:
         """Box over states, then memory, around everything passed in the closed interval [t0, t1] (seconds).
 
+        Parameters
+        ----------
+        r : (k,) array, optional
+            One reference of a continuous class; without it, all of them count.
+
         Raises
         ------
         ModegraphError
-            If the interval is empty or leaves the computed time.
+            If the interval is empty or leaves the computed time, or if r is not of the class.
         """
         a, b = self._instant(t0, "t0"), self._instant(t1, "t1")
         if a > b:
             raise ModegraphError(f"{self._label}: flowpipe.hull: t0 = {a:.6g} is after t1 = {b:.6g}; exchange them")
-        if (a, b) not in self._boxes:
+        if r is not None and self._one_of is None:
+            raise ModegraphError(f"{self._label}: this flowpipe is that of one reference; leave r out")
+        p = None if r is None or self._one_of is None else self._one_of.parameters(r)
+        key = a, b, b"" if p is None else p.tobytes()
+        if key not in self._boxes:
             slices = [s for part in self._parts for s in _slices(part, a, b)]
-            self._boxes[a, b] = Box(*hull(slices))
-        return self._boxes[a, b]
+            if p is not None and self._one_of is not None:
+                slices = self._one_of.restricted(slices, p)
+            self._boxes[key] = Box(*hull(slices))
+        return self._boxes[key]
 
     def _instant(self, t: Any, name: str) -> float:
         try:
@@ -205,7 +221,8 @@ def flowpipe(
     Parameters
     ----------
     r : (m,) array, optional
-        Which reference of the mode's class; may be left out when there is only one.
+        Which reference of the mode's class; may be left out when there is only one. For a continuous class,
+        leaving it out gives one flowpipe of all of them, whose ``at`` and ``hull`` take r.
     horizon : float, optional
         Seconds. Default: the mode's horizon; else the duration of its reference; else 10 s.
     start : Set, optional
@@ -218,15 +235,17 @@ def flowpipe(
     """
     if not isinstance(mode, Mode):
         raise ModegraphError(f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each")
-    p = mode.reference.parameters()[mode.match(r)]
+    p = mode.find(r, whole=True)
     if start is not None:
         mode = copy(mode)
         mode.start = start
     label = f"mode {mode.label_of(p)!r}"
     end = _horizon(mode, horizon, label)
     compiled = compile_mode(mode, p, observed=False)
-    chains, stuck = _Cutting(compiled, end).run()
-    return Flowpipe(label, compiled.loop.names, end, chains, stuck)
+    with one_core():
+        chains, stuck = Cutting(compiled, end).run()
+    one_of = Restrictor(mode, compiled) if compiled.parameters else None
+    return Flowpipe(label, compiled.loop.names, end, chains, stuck, one_of)
 
 
 def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
@@ -241,31 +260,6 @@ def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
     return end
 
 
-def monomial_count(variables: int, degree: int) -> int:
-    return math.comb(variables + degree, degree)
-
-
-def orders(compiled: CompiledMode, variables: int) -> list[Order]:
-    """Degrees to try for a piece with so many variables, lowest first. Linear loops need degree 1."""
-    if compiled.linear or variables == 0:
-        return [Order(1, 0)]
-    found: list[Order] = []
-    for degree, jacobian in LADDER:
-        if found and degree > MOST_DISTURBED and compiled.w_radius.any():
-            break
-        count = monomial_count(variables, degree)
-        if found and count > MOST_HEAVY_MONOMIALS:
-            break
-        while jacobian > 1 and math.comb(variables + jacobian, jacobian) > MOST_GENERATOR_MONOMIALS:
-            jacobian -= 1
-        order = Order(degree, jacobian)
-        if count <= LIGHT_MONOMIALS and degree <= MOST_LIGHT:
-            found = [order]
-        else:
-            found.append(order)
-    return found
-
-
 @dataclass(frozen=True)
 class _Part:
     """A piece with its best chain: which rung of the ladder made it, and the last rung worth trying."""
@@ -275,50 +269,70 @@ class _Part:
     top: int
 
 
-class _Cutting:
+class Cutting:
     """Pieces of the start set, cut where the flowpipe ends first, as long as that gets further."""
 
-    def __init__(self, compiled: CompiledMode, end: float) -> None:
-        self.compiled, self.end = compiled, end
+    def __init__(self, compiled: CompiledMode, end: float, deadline: float = math.inf) -> None:
+        self.compiled, self.end, self.deadline = compiled, end, deadline
         self.framed: Sequence[Field] = compiled.framed_fields()
         self.disturbed = bool(compiled.w_radius.any())
 
     def run(self) -> tuple[list[Chain], str]:
         """A chain for each piece, and why cutting ended where it failed."""
         whole = self.compiled.whole()
-        ladder = orders(self.compiled, whole.variables)
-        with one_core():
-            parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
-            stuck = ""
-            while not stuck and any(part.chain.failure for part in parts):
-                worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-                piece = worst.chain.piece
-                if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
-                    stuck = "; no more are tried"
-                    break
-                halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
-                children = list(
-                    in_parallel([partial(self._best, half, ladder, worst.rung, worst.top) for half in halves])
-                )
-                ended = [child.chain.time for child in children if child.chain.failure]
-                if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
-                    stuck = "; cutting it gets no further"
-                    break
-                # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
-                parts = [part for part in parts if part is not worst] + children
+        if self.compiled.parameters:
+            ladder = class_orders(self.compiled, whole, self.end)
+        else:
+            ladder = orders(self.compiled, whole.variables)
+        parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
+        stuck = ""
+        while not stuck and any(part.chain.failure for part in parts):
+            worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
+            piece = worst.chain.piece
+            enough = time.monotonic() > self.deadline or len(parts) >= MOST_PIECES
+            if enough or piece.depth >= DEEPEST_CUT or piece.variables == 0:
+                stuck = "; no more are tried"
+                break
+            children = self._halves(worst, ladder)
+            ended = [child.chain.time for child in children if child.chain.failure]
+            if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
+                stuck = "; cutting it gets no further"
+                break
+            # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
+            parts = [part for part in parts if part is not worst] + children
+        if self.compiled.parameters and not stuck and not self.disturbed:
+            parts = self._tighter(parts, ladder)
         return [part.chain for part in parts], stuck
+
+    def _halves(self, part: _Part, ladder: Sequence[Order]) -> list[_Part]:
+        halves = part.chain.piece.split(nonlinear_variable(part.chain.flows[0]))
+        return list(in_parallel([partial(self._best, half, ladder, part.rung, part.top) for half in halves]))
+
+    def _tighter(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
+        """Pieces of a class of references, the loosest cut as long as they are very loose and that helps."""
+        while len(parts) < MOST_LOOSE_PIECES and time.monotonic() < self.deadline:
+            loosest = max(parts, key=lambda part: looseness(part.chain))
+            if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
+                break
+            children = self._halves(loosest, ladder)
+            if max(looseness(child.chain) for child in children) > WORTH_CUTTING * looseness(loosest.chain):
+                break
+            parts = [part for part in parts if part is not loosest] + children
+        return parts
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""
-        light = [monomial_count(piece.variables, order.degree) <= MOST_MONOMIALS for order in ladder]
+        light = [is_light(order, piece) for order in ladder]
         best: _Part | None = None
         given_up: _Part | None = None
         for rung in range(first, top + 1):
-            if best is not None and not light[rung] and (best.chain.failure or not _very_loose(best.chain)):
+            if best is not None and time.monotonic() > self.deadline:
                 break
-            chain = Chain(self.compiled, self.framed, piece, ladder[rung])
+            if best is not None and not light[rung] and (best.chain.failure or not is_very_loose(best.chain)):
+                break
+            chain = Chain(self.compiled, self.framed, piece, ladder[rung], self.deadline)
             impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
-            done = chain.run(self.end, _to_give_up if impatient else None)
+            done = chain.run(self.end, is_given_up if impatient else None)
             if done and chain.time < self.end:
                 given_up = _Part(chain, rung, top)
                 continue
@@ -329,7 +343,7 @@ class _Cutting:
             if best is not None and not _further(chain, best.chain):
                 return replace(best, top=best.rung)
             best = _Part(chain, rung, top)
-            if not chain.begun or (done and (self.disturbed or not _loose(chain))):
+            if not chain.begun or (done and (self.disturbed or not is_loose(chain))):
                 break
         assert best is not None
         return best
@@ -339,22 +353,4 @@ def _further(chain: Chain, other: Chain) -> bool:
     """Whether a chain of higher degree is worth its cost: it gets further, or is narrower at the end."""
     if chain.failure or other.failure:
         return not chain.failure or chain.time > PROGRESS * other.time
-    return float(_remainder(chain)[0].max()) < float(_remainder(other)[0].max())
-
-
-def _remainder(chain: Chain) -> tuple[Floats, Floats]:
-    """Radii (n,) of the last set: of its remainder, and of its polynomial part."""
-    flow = chain.flows[-1]
-    p, G = flow.state_set(len(flow.steps))
-    return generator_box(G), np.abs(p[:, 1:]).sum(axis=1)
-
-
-def _loose(chain: Chain, share: float = LOOSE) -> bool:
-    """Whether the remainder counts in the width of the last set, beyond what time steps leave."""
-    z, own = _remainder(chain)
-    size = float(np.abs(chain.flows[-1].set_at(0)[0]).sum(axis=1).max())
-    return bool((z > share * own + 1e-6 * size).any())
-
-
-_very_loose = partial(_loose, share=VERY_LOOSE)
-_to_give_up = partial(_loose, share=GIVE_UP)
+    return float(remainder(chain)[0].max()) < float(remainder(other)[0].max())

@@ -12,10 +12,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Order:
-    """Degrees of the flowpipe: ``degree`` of p and ``jacobian`` of Psi and G in the set variables."""
+    """Degrees of the flowpipe: ``degree`` of p and ``jacobian`` of Psi and G in the set variables.
+
+    A variable of weight 2 counts twice in the degree of a monomial; without ``weights`` all count once.
+    """
 
     degree: int
     jacobian: int
+    weights: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

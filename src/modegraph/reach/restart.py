@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,24 +37,17 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
     latest of their instants: valid only where the loop does not depend on time. ``fields`` may be in
     another frame than those of the flows.
     """
-    enclosed = _around_one(flows[0], fields) if len(flows) == 1 else None
-    if enclosed is None:
-        enclosed = _around_all(flows, fields)
-    if enclosed is None:
+    piece = _around_one(flows[0], fields) if len(flows) == 1 else None
+    if piece is None:
+        piece = _around_all(flows, fields)
+    if piece is None:
         return None
-    centre, axes = enclosed
     first = flows[0]
-    chart = first.piece.chart.around(centre, axes, original=False)
-    m = first.piece.chart.free
-    free = axes.shape[1]
-    variables = free + len(first.piece.uncertain)
-    full = math.comb(variables + FULL.degree, variables)
-    lo = np.concatenate([-np.ones(free), np.min([flow.piece.lo[m:] for flow in flows], axis=0)])
-    hi = np.concatenate([np.ones(free), np.max([flow.piece.hi[m:] for flow in flows], axis=0)])
+    full = math.comb(piece.variables + FULL.degree, piece.variables)
     spent = [float(f.seen_bounds.upper(f.steps[-1].energy) + f.steps[-1].energy_radius) for f in flows]
     return Flow(
         fields,
-        Piece(chart, lo, hi),
+        piece,
         first.w_centre,
         first.w_radius,
         FULL if full <= MOST_MONOMIALS else CHEAP,
@@ -72,34 +66,46 @@ def _candidates(fields: Sequence[Field], bounds: PolynomialBounds, p: Floats, G:
     return [np.eye(len(p)), principal_axes(bounds, p, G), *([] if frame is None else [frame.V])]
 
 
-def _around_one(flow: Flow, fields: Sequence[Field]) -> tuple[Floats, Floats] | None:
-    """Centre and axes: the linear part of p as it is, and a parallelotope around all the rest."""
+def _around_one(flow: Flow, fields: Sequence[Field]) -> Piece | None:
+    """The linear part of p as it is, in the unknowns and once also in xi, and a parallelotope around all the rest."""
     p, G = flow.state_set(len(flow.steps))
     n, free = len(p), flow.piece.chart.free
-    linear = flow.bounds.linear_part(p)
-    if not 0 < free <= n:
+    keep = 0 < free <= n
+    if not keep and not len(flow.piece.uncertain):
         return None
-    below, above = flow.bounds.nonlinear_radius(p)
-    middle = 0.5 * (below + above)
-    centre = p[:, 0] + middle
-    rest = 0.5 * (above - below) + np.abs(linear[:, free:]).sum(axis=1)
-    rest = rest * (1.0 + 1e-12) + 8.0 * UNIT * (np.abs(centre) + np.abs(middle))
-    box = np.zeros((n, n, G.shape[2]))
-    box[np.arange(n), np.arange(n), 0] = rest
-    every = np.concatenate([G, box])
-    nothing, origin = np.zeros_like(p), np.zeros(n)
-    found = tightest([(flow.bounds, nothing, every)], _candidates(fields, flow.bounds, nothing, every), origin)
+    linear = flow.bounds.linear_part(p)
+    centre, body = p[:, 0].copy(), np.zeros_like(p)
+    if keep:
+        below, above = flow.bounds.nonlinear_radius(p)
+        middle = 0.5 * (below + above)
+        centre = centre + middle
+        rest = 0.5 * (above - below) * (1.0 + 1e-12) + 8.0 * UNIT * (np.abs(centre) + np.abs(middle))
+        box = np.zeros((n, n, G.shape[2]))
+        box[np.arange(n), np.arange(n), 0] = rest
+        G = np.concatenate([G, box])
+    else:
+        body = p.copy()
+        body[:, 0] = 0.0
+        body[:, flow.table.linear[free:]] = 0.0
+    origin = np.zeros(n)
+    found = tightest([(flow.bounds, body, G)], _candidates(fields, flow.bounds, body, G), origin)
     if found is None:
         return None
     M = found[0] * (found[1] * (1.0 + 1e-9))
     # The products are rounded entry by entry: what counts is that this very M holds the rest.
-    if not (half_widths(flow.bounds, nothing, every, M, origin) <= 1.0).all():
+    if not (half_widths(flow.bounds, body, G, M, origin) <= 1.0).all():
         return None
-    return centre, np.hstack([linear[:, :free], M])
+    old = flow.piece.chart
+    chart = old.around(centre, np.hstack([linear[:, :free], M]) if keep else M, original=False)
+    lo, hi = old.unknown_lo.copy(), old.unknown_hi.copy()
+    for i in flow.piece.uncertain.tolist():
+        # The same variable: an unknown on the scale of its range in this piece.
+        lo[i], hi[i] = flow.piece.unknown_range(i)
+    return Piece.whole(replace(chart, unknown_lo=lo, unknown_hi=hi, tilt=linear[:, free:]))
 
 
-def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> tuple[Floats, Floats] | None:
-    """Centre and axes of one parallelotope around the ends of all flows."""
+def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> Piece | None:
+    """One parallelotope around the ends of all flows."""
     sets = [(flow.bounds, *flow.state_set(len(flow.steps))) for flow in flows]
     hulls = [flow.end_box() for flow in flows]
     centre = 0.5 * (np.min([lo for lo, _ in hulls], axis=0) + np.max([hi for _, hi in hulls], axis=0))
@@ -109,4 +115,9 @@ def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> tuple[Floats,
     M = found[0] * (found[1] * (1.0 + 1e-9))
     if not all((half_widths(bounds, p, G, M, centre) <= 1.0).all() for bounds, p, G in sets):
         return None
-    return centre, M
+    chart, m = flows[0].piece.chart, flows[0].piece.chart.free
+    lo = np.min([flow.piece.lo[m:] for flow in flows], axis=0)
+    hi = np.max([flow.piece.hi[m:] for flow in flows], axis=0)
+    ones = np.ones(M.shape[1])
+    chart = chart.around(centre, M, original=False)
+    return Piece(chart, np.concatenate([-ones, lo]), np.concatenate([ones, hi]))

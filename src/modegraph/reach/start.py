@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..enclosure.rounding import UNIT
 from ..errors import ModegraphError
+from ..expression.tape import Tape
 from ..model.sets.ball import Ball
 from ..model.sets.base import Set
 from ..model.sets.box import Box
@@ -50,6 +51,14 @@ class Chart:
     """The starts themselves, not a later reach set."""
     sublevel: Sublevel | None = None
     """Only points of this set count; the axes are then parallel to the coordinates."""
+    parameters: int = 0
+    """How many of the unknowns, the last ones, are parameters of a class of references."""
+    form: Tape | None = None
+    """The starts as a function of xi and the parameters; centre and axes are then those of one reference."""
+    rounded: Floats | None = None
+    """(n,): with a form, what the starts may differ by when they are computed in floats."""
+    tilt: Floats | None = None
+    """(n, uncertain unknowns): c moves by this for each of them scaled to [-1, 1]."""
 
     @property
     def free(self) -> int:
@@ -58,7 +67,7 @@ class Chart:
 
     def around(self, centre: Floats, axes: Floats, original: bool) -> Chart:
         """A chart of the parallelotope centre + axes [-1, 1]^k, with the same unknowns."""
-        return Chart(centre, axes, False, None, self.unknown_lo, self.unknown_hi, original)
+        return Chart(centre, axes, False, None, self.unknown_lo, self.unknown_hi, original, parameters=self.parameters)
 
     def box(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
         """A box of states that holds c + L xi for lo <= xi <= hi, for axes parallel to the coordinates."""
@@ -80,6 +89,12 @@ class Piece:
     lo: Floats
     hi: Floats
     depth: int = 0
+
+    @classmethod
+    def whole(cls, chart: Chart) -> Piece:
+        """All of a chart."""
+        m = chart.free + int((chart.unknown_lo < chart.unknown_hi).sum())
+        return cls(chart, -np.ones(m), np.ones(m))
 
     @cached_property
     def uncertain(self) -> NDArray[np.int64]:
@@ -121,8 +136,16 @@ class Piece:
         states[:, 0] = chart.centre + chart.axes @ self.middle[:m]
         for v in range(m):
             states[:, linear[v]] = chart.axes[:, v] * self.radius[v]
-        slack = (np.abs(chart.centre) + np.abs(chart.axes).sum(axis=1)) * (m + 4) * 2.0 * UNIT
-        exact = (self.middle[:m] == 0.0) & (self.radius[:m] == 1.0)
+        extent = np.abs(chart.centre) + np.abs(chart.axes).sum(axis=1)
+        used = m
+        if chart.tilt is not None:
+            used = self.variables
+            states[:, 0] += chart.tilt @ self.middle[m:]
+            for v in range(m, used):
+                states[:, linear[v]] = chart.tilt[:, v - m] * self.radius[v]
+            extent = extent + np.abs(chart.tilt).sum(axis=1)
+        slack = extent * (used + 4) * 2.0 * UNIT
+        exact = (self.middle[:used] == 0.0) & (self.radius[:used] == 1.0)
         if exact.all():
             slack = np.zeros(n)
         unknowns = np.zeros((len(chart.unknown_lo), size))
@@ -235,8 +258,8 @@ class Piece:
         return np.asarray(np.fmin(box * (1.0 + 4.0 * len(self.lo) * UNIT), ball + slack))
 
 
-def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
-    """The piece that covers a bounded start set and all unknown constants."""
+def whole(start: Set, unknowns: Sequence[tuple[float, float]], parameters: int = 0) -> Piece:
+    """The piece that covers a bounded start set and all unknown constants, of which the last may be parameters."""
     cut: Sublevel | None = None
     if isinstance(start, Sublevel):
         if start.ellipsoids is None:
@@ -246,9 +269,8 @@ def whole(start: Set, unknowns: Sequence[tuple[float, float]]) -> Piece:
     centre, axes, ball, faces = _chart(start)
     lo = np.array([u[0] for u in unknowns], float)
     hi = np.array([u[1] for u in unknowns], float)
-    chart = Chart(centre, axes, ball, faces, lo, hi, sublevel=cut)
-    m = axes.shape[1] + int((lo < hi).sum())
-    piece = Piece(chart, -np.ones(m), np.ones(m)).tightened()
+    chart = Chart(centre, axes, ball, faces, lo, hi, sublevel=cut, parameters=parameters)
+    piece = Piece.whole(chart).tightened()
     if piece is None:
         raise ModegraphError("the start set is empty: no edge can be proved from it")
     return piece
@@ -267,7 +289,7 @@ def _chart(start: Set) -> tuple[Floats, Floats, bool, tuple[Floats, Floats] | No
         axes = np.eye(n) * float(start.radius)
         return np.array(start.c, float), axes if start.radius > 0 else np.zeros((n, 0)), True, None
     if isinstance(start, Ellipsoid):
-        return np.array(start.c, float), _ellipsoid_axes(start), True, None
+        return np.array(start.c, float), ellipsoid_axes(start), True, None
     if isinstance(start, Zonotope):
         generators = np.array(start.generators, float)
         return np.array(start.c, float), generators[:, np.abs(generators).sum(axis=0) > 0], False, None
@@ -305,7 +327,7 @@ def _scaled_faces(A: Floats, b: Floats) -> tuple[Floats, Floats]:
     return scaled[fine], bound[fine]
 
 
-def _ellipsoid_axes(start: Ellipsoid) -> Floats:
+def ellipsoid_axes(start: Ellipsoid) -> Floats:
     """L with shape <= L L' (so that c + L (unit ball) covers the ellipsoid), floats checked upward."""
     shape = np.array(start.shape, float)
     diagonal = np.diag(shape)

@@ -59,8 +59,7 @@ def plot_plan(plan: Plan, ax: Any = None) -> Any:
     earliest = latest = 0.0
     labels = []
     for row, (name, reference) in enumerate(zip(plan.modes, plan.references, strict=True)):
-        single = len(plan.graph.indices(name)) == 1
-        labels.append(name if single else f"{name} {parameter_text(reference)}")
+        labels.append(name if not plan.graph.has_choice(name) else f"{name} {parameter_text(reference)}")
         last = row == len(plan.switches)
         leave = (
             (earliest, latest)

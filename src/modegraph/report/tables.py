@@ -84,7 +84,7 @@ def _entered(run: Run) -> list[str]:
 
 def _verdicts(graph: ModeGraph) -> list[tuple[str, str, Verdict]]:
     sources = [name for name, mode in graph.modes.items() if not isinstance(mode, Target)]
-    return [(i, j, graph.verdict(i, j)) for i in sources for j in graph.modes if i != j or len(graph.indices(i)) > 1]
+    return [(i, j, graph.verdict(i, j)) for i in sources for j in graph.modes if i != j or graph.has_choice(i)]
 
 
 def _checks(graph: ModeGraph) -> dict[str, Verdict]:

@@ -28,6 +28,16 @@ class Set(ABC):
 
     _fields: ClassVar[tuple[str, ...]]
 
+    def __new__(cls, *args: Any, **kwargs: Any) -> Any:
+        """Traced numbers (``start`` of a continuous class of references) make a ParametrisedSet instead."""
+        from modegraph.expression.array import is_traced
+
+        if is_traced([*args, *kwargs.values()]):
+            from modegraph.model.sets.parametrised import ParametrisedSet
+
+            return ParametrisedSet(cls, args, kwargs)
+        return super().__new__(cls)
+
     @property
     @abstractmethod
     def dim(self) -> int:

@@ -207,7 +207,7 @@ class LevelFunction:
         try:
             values = [exact_value(self.graph, part.expr.index, point) for part in self.parts]
             values += [exact_value(self.graph, k, point) for k in self.graph.dropped]
-        except _Irrational:
+        except Irrational:
             return bool(self.inside(x[None], x[None])[0])
         if any(value is None for value in values):
             return False
@@ -218,7 +218,7 @@ class LevelFunction:
         )
 
 
-class _Irrational(Exception):
+class Irrational(Exception):
     """A value is not a rational number, or too long a one."""
 
 
@@ -227,7 +227,7 @@ LONGEST = 20_000
 
 
 def exact_value(graph: Graph, index: int, point: exact.Row) -> Fraction | None:
-    """The exact value of a node; None where it is undefined. Raises `_Irrational` where it is not rational."""
+    """The exact value of a node; None where it is undefined. Raises `Irrational` where it is not rational."""
     from modegraph.expression import ops
 
     known: dict[int, Fraction | None] = {}
@@ -237,7 +237,7 @@ def exact_value(graph: Graph, index: int, point: exact.Row) -> Fraction | None:
             known[k] = compute(k)
             number = known[k]
             if number is not None and number.numerator.bit_length() + number.denominator.bit_length() > LONGEST:
-                raise _Irrational
+                raise Irrational
         return known[k]
 
     def compute(k: int) -> Fraction | None:
@@ -267,7 +267,7 @@ def _rational(op: int, a: Fraction, b: Fraction, const: Fraction) -> Fraction:
 
     if op in (ops.SIN, ops.COS, ops.EXP, ops.ATAN, ops.LOG):
         if a != (1 if op == ops.LOG else 0):
-            raise _Irrational
+            raise Irrational
         return Fraction(1 if op in (ops.COS, ops.EXP) else 0)
     if op == ops.RECIP:
         return 1 / a

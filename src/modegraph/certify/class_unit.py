@@ -1,0 +1,191 @@
+"""One unit of work with a continuous class of references on one side or both: relations instead of verdicts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import ModegraphError
+from ..expression.scalar import Expr
+from ..expression.simplify import simplify
+from ..model.class_start import StartClass
+from ..model.mode import Mode
+from ..model.trajectory import at_instant
+from ..reach.chain import Chain, nonlinear_variable
+from ..reach.compiled import CompiledMode, compile_mode
+from ..reach.flow import Flow, Order
+from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
+from ..reach.ladder import CURVED
+from .crossing import proved_instants
+from .evidence import sampled_violation, slack_until, width_over_time
+from .moments import moments_of
+from .proof import SafetyProof, certified_check, least_slack, safe_together
+from .relation import Part, Relation, whole_relation
+from .target_class import TargetClass, target_class
+from .unit import TargetSpec
+from .verdict import Floats, Status, Verdict
+
+MOST_PARTS = 32
+DEEPEST = 7
+PROGRESS = 1.05
+"""A cut must carry the constraints this much further, or it is the last one."""
+
+
+@dataclass(frozen=True)
+class ClassResult:
+    """Relations parallel to the targets (a text where there can be none), and the check of the whole class.
+
+    ``slack``: of the constraints, until the last instant any of the relations uses.
+    """
+
+    relations: list[Relation | str]
+    check: Verdict
+    slack: dict[str, float]
+    horizon: float
+
+
+def relate(
+    mode: Mode,
+    p: Floats | None,
+    targets: Sequence[TargetSpec],
+    *,
+    horizon: float | None,
+    deadline: float,
+    progress: Callable[[str], None],
+) -> ClassResult:
+    """The relations from a mode - under one reference, or p = None for its whole class - to its targets.
+
+    Parameters
+    ----------
+    horizon : seconds a switch may take; None: the duration of the reference and some more.
+    """
+    compiled = compile_mode(mode, p)
+    end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
+    chains = _legal_chains(compiled, end, deadline, progress)
+    parameters = len(compiled.parameters)
+    relations: list[Relation | str] = []
+    for spec in targets:
+        try:
+            goal = target_class(spec.mode, spec.p, compiled.plant)
+        except ModegraphError as error:
+            relations.append(str(error))
+            continue
+        parts = [_part(chain, goal, end, parameters) for chain in chains]
+        relations.append(whole_relation(parameters, goal, parts, _resting(mode, p, compiled)))
+    slack = least_slack(slack_until(flow, k) for chain in chains for flow, k in _proved(chain))
+    return ClassResult(relations, _check(compiled, chains), slack, end)
+
+
+def _part(chain: Chain, goal: TargetClass, end: float, parameters: int) -> Part | None:
+    moments = (moments_of(flow, goal, end, parameters) for flow, _ in _proved(chain))
+    found = [m for m in moments if m is not None]
+    return Part(tuple(found)) if found else None
+
+
+def _proved(chain: Chain) -> list[tuple[Flow, int]]:
+    """The flows of a chain as far as the constraints are proved, each with its last proved instant."""
+    found: list[tuple[Flow, int]] = []
+    for flow in chain.flows:
+        k = proved_instants(flow)
+        if k >= 0:
+            found.append((flow, k))
+        if k < len(flow.steps):
+            break
+    return found
+
+
+def _proved_until(chain: Chain) -> float:
+    """Seconds until which the constraints are proved; -1: not even at the start."""
+    found = _proved(chain)
+    return float(found[-1][0].times[found[-1][1]]) if found else -1.0
+
+
+def _legal_chains(
+    compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]
+) -> list[Chain]:
+    """Chains that cover all starts, cut where a constraint cannot be proved, as long as that helps."""
+    cutting = Cutting(compiled, end, deadline)
+    chains, _ = cutting.run()
+    while len(chains) < MOST_PARTS and time.monotonic() < deadline:
+        progress(f"{len(chains)} parts")
+        worst = min(chains, key=_proved_until)
+        until = _proved_until(worst)
+        if until >= min(end, worst.time) or (until >= 0.0 and sampled_violation(worst.flows[0])):
+            break
+        if worst.order.degree < CURVED:
+            halves, order = [worst.piece], Order(CURVED, CURVED - 1)
+        else:
+            halves, order = worst.piece.split(nonlinear_variable(worst.flows[0])), worst.order
+        children = [Chain(compiled, cutting.framed, half, order, deadline) for half in halves]
+        for child in children:
+            child.run(end)
+        further = min(map(_proved_until, children), default=np.inf) > PROGRESS * until
+        if (until >= 0.0 and not further and len(halves) > 1) or worst.piece.depth >= DEEPEST:
+            break
+        chains = [chain for chain in chains if chain is not worst] + children
+    return chains
+
+
+def _resting(mode: Mode, p: Floats | None, compiled: CompiledMode) -> TargetClass | None:
+    """The centres of the start sets, where each is an equilibrium of the undisturbed loop, for all unknowns."""
+    loop = compiled.loop
+    segment = loop.segments[-1]
+    inside = not len(compiled.w_centre) or bool((np.abs(compiled.w_centre) <= compiled.w_radius).all())
+    if len(loop.segments) != 1 or loop.reset or not inside:
+        return None
+    graph = loop.graph
+    start = compiled.start
+    if isinstance(start, StartClass):
+        centre = _centre_in(mode, compiled)
+    else:
+        centre = [graph.constant(float(v)) for v in np.asarray(start.center, float)]
+    known = {x.index: c.index for x, c in zip(loop.states, centre, strict=True)}
+    known |= {w.index: graph.constant(0).index for w in loop.disturbance}
+    dropped = len(graph.dropped)
+    rates = [Expr(graph, k) for k in graph.rewrite([e.index for e in segment.rhs], known=known)]
+    rates = simplify(rates, seconds=0.5).exprs
+    del graph.dropped[dropped:]
+    if not all(e.is_constant and e.value == 0 for e in rates):
+        return None
+    try:
+        return target_class(mode, p, compiled.plant)
+    except ModegraphError:
+        return None
+
+
+def _centre_in(mode: Mode, compiled: CompiledMode) -> list[Expr]:
+    """The centre of the start set as expressions of the closed loop's own graph."""
+    from ..expression.trace import call
+    from ..model.sets.parametrised import ParametrisedSet
+    from ..model.traced_reference import TracedReference
+
+    loop = compiled.loop
+    assert not hasattr(mode.start, "contains")
+    first = mode.reference.pieces(loop.graph, loop.time, loop.parameters, mode.label)[0]
+    value, dot, ddot = (at_instant(part, loop.time, 0.0) for part in (first.value, first.dot, first.ddot))
+    reference = TracedReference.of(value, dot, ddot, loop.parameters)
+    returned = call(mode.start, {"r": reference}, role="start", owner=mode.label)
+    assert isinstance(returned, ParametrisedSet)
+    return returned.traced(loop.graph, mode.label).centre
+
+
+def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
+    """Assumption 1 for the whole class: proved as far as the flows go; for ever where nothing is to be proved."""
+    until = min(map(_proved_until, chains))
+    last = compiled.fields[-1]
+    widths = width_over_time(chains[0].flows[:1])
+    if compiled.linear and not any(f.faces for f in compiled.fields) and until >= last.start:
+        # A linear loop has a solution for all time, and there is nothing else to prove.
+        proof = safe_together([SafetyProof({}, until, np.full(last.outputs, np.inf))])
+        assert proof is not None
+        return replace(certified_check(proof), widths=widths)
+    reason = (
+        f"constraints proved until t = {until:.4g} s for all references of the class; what comes later is not decided "
+        "for a continuous class yet: check one reference of it with mg.Points([...])"
+        if until >= 0.0
+        else "the constraints are not proved at the start for all references of the class"
+    )
+    return Verdict(Status.UNDECIDED, reason, until=max(until, 0.0), widths=widths)

@@ -1,0 +1,162 @@
+"""The start sets S_j(p) of one node as inequalities whose right-hand sides depend on its reference p.
+
+Round sets: |T (x - c(p))|_2 <= s(p). Flat ones: A (x - c(p)) <= b(p), face by face. T and A do not
+depend on p: that is what makes R^ij a closed formula (design, decision 8).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..enclosure.intervals import IntervalEvaluator
+from ..errors import ModegraphError
+from ..expression.derivative import derivative
+from ..expression.scalar import Expr
+from ..expression.tape import compile_tape
+from ..model.class_start import StartClass, class_start
+from ..model.mode import Mode
+from ..model.sets import Ball, Box, Ellipsoid, Set, Zonotope
+from ..model.start import mode_start
+from ..model.target import Target
+from .region import Region
+
+Floats = NDArray[np.float64]
+
+ROUNDED = 1e-12
+"""Relative allowance: a start set written with floats may differ so much from its exact formula."""
+
+
+@dataclass(frozen=True)
+class TargetClass:
+    """S_j(p) for p in ``region`` (None: one set).
+
+    Attributes
+    ----------
+    rows : (f, n) array
+        T of a round set, A of a flat one; ``d_rows`` bounds their rounding, ``grow`` that of the norm.
+    round : bool
+    """
+
+    dim: int
+    region: Box | None
+    round: bool
+    rows: Floats
+    d_rows: Floats
+    grow: float
+    _centre: Floats | StartClass
+    _limits: Floats
+
+    @property
+    def parameters(self) -> int:
+        return 0 if self.region is None else self.region.dim
+
+    @cached_property
+    def slack(self) -> Floats:
+        """(f,): what a row may miss, for each unit of |x - c|."""
+        return np.asarray(self.d_rows.sum(axis=1))
+
+    @cached_property
+    def _tape(self) -> IntervalEvaluator:
+        assert isinstance(self._centre, StartClass)
+        return IntervalEvaluator(compile_tape(_numbers(self._centre), self._centre.parameters))
+
+    @cached_property
+    def affine(self) -> tuple[Floats, Floats] | None:
+        """c(p) = c0 + C p, (n,) and (n, k), where c is affine and the limits are fixed; None elsewhere."""
+        if not isinstance(self._centre, StartClass):
+            return self._centre, np.zeros((self.dim, self.parameters))
+        exprs = _numbers(self._centre)
+        slopes = derivative(exprs, self._centre.parameters)
+        if not all(e.is_constant for row in slopes for e in row) or not all(
+            e.is_constant for e in exprs[self.dim :]
+        ):
+            return None
+        low, high, _ = self._tape(np.zeros((self.parameters, 1)), np.zeros((self.parameters, 1)))
+        C = np.array([[float(e.value) for e in row] for row in slopes[: self.dim]])
+        return 0.5 * (low + high)[: self.dim, 0], C
+
+    def at(self, p: Floats, outer: bool = False) -> tuple[Floats, Floats, Floats]:
+        """Centres (B, n), radii (B, n) around the true ones and limits (B, f or 1) for references p (B, k).
+
+        S_j contains the set with these limits around the true centre; with ``outer`` it is contained in it.
+        """
+        B, n = len(p), self.dim
+        if not isinstance(self._centre, StartClass):
+            centre = np.broadcast_to(self._centre, (B, n))
+            return centre, np.zeros((B, n)), np.broadcast_to(self._limits, (B, len(self._limits)))
+        low, high, _ = self._tape(np.ascontiguousarray(p.T), np.ascontiguousarray(p.T))
+        low, high = low.T, high.T
+        centre = 0.5 * low[:, :n] + 0.5 * high[:, :n]
+        own = np.maximum((high if outer else low)[:, n:], 0.0)
+        radius = np.maximum(high[:, :n] - centre, centre - low[:, :n])
+        radius = radius + ROUNDED * (np.abs(centre) + own.max(axis=1, initial=0.0)[:, None])
+        if not own.shape[1]:
+            return centre, radius, np.broadcast_to(self._limits, (B, len(self._limits)))
+        return centre, radius, own if self.round else np.concatenate([own, own], axis=1)
+
+
+def target_class(mode: Mode | Target, p: Floats | None, plant: int) -> TargetClass:
+    """The start sets of a node: of a Target, of a mode under the reference p, or under a whole continuous class.
+
+    Raises
+    ------
+    ModegraphError
+        For sets that are not round or flat, and those on a memory as well.
+    """
+    if isinstance(mode, Target):
+        mode.settle(plant)
+        return _fixed(mode.set, mode.name)
+    if mode.reference.region is None or p is not None:
+        return _fixed(mode_start(mode, p), mode.name, plant)
+    start = class_start(mode)
+    if isinstance(start, Set):
+        return _fixed(start, mode.name, plant, mode.reference.region)
+    if start.dim != plant:
+        raise ModegraphError(f"mode {mode.name!r}: a target over a memory cannot depend on a continuous class yet")
+    n, traced = start.dim, start.set
+    eye = np.eye(n)
+    nothing = np.zeros((n, n))
+    if traced.kind is Ball:
+        return TargetClass(n, start.region, True, eye, nothing, 1.0, start, np.zeros(0))
+    if traced.ellipsoid is not None:
+        region = Region(traced.ellipsoid)
+        return TargetClass(n, start.region, True, region.T, nothing, region.grow, start, np.ones(1))
+    if traced.kind is Box:
+        both = np.vstack([eye, -eye])
+        return TargetClass(n, start.region, False, both, np.zeros_like(both), 1.0, start, np.zeros(0))
+    if traced.kind is Zonotope and all(e.is_constant for row in traced.axes for e in row):
+        shape = Region(Zonotope(np.zeros(n), [[float(e.value) for e in row] for row in traced.axes]))
+        return TargetClass(n, start.region, False, shape.A, shape.dA, 1.0, start, shape.b)
+    raise ModegraphError(
+        f"mode {mode.name!r}: a Zonotope whose generators depend on the reference cannot be a target; use a Box"
+    )
+
+
+def _fixed(target: Set, name: str, plant: int | None = None, region: Box | None = None) -> TargetClass:
+    if plant is not None and target.dim != plant:
+        raise ModegraphError(f"mode {name!r}: a target over a memory cannot be met for a continuous class yet")
+    if not isinstance(target, (Ball, Ellipsoid)) and target.faces() is None:
+        raise ModegraphError(f"mode {name!r}: a {type(target).__name__} cannot be a target of a continuous class yet")
+    shape = Region(target)
+    centre = np.asarray(shape.centre, float)
+    if hasattr(shape, "quadric"):
+        return TargetClass(
+            target.dim, region, True, shape.T, np.zeros_like(shape.T), shape.grow, centre, np.ones(1)
+        )
+    distance = shape.b - shape.A @ centre
+    slack = 1e-14 * (np.abs(shape.b) + np.abs(shape.A) @ np.abs(centre))
+    return TargetClass(target.dim, region, False, shape.A, shape.dA, 1.0, centre, distance - slack)
+
+
+def _numbers(start: StartClass) -> list[Expr]:
+    """Centre, then the sizes that depend on p: a Ball's radius, a Box's half-widths."""
+    traced = start.set
+    if traced.kind is Ball:
+        return [*traced.centre, traced.axes[0][0]]
+    if traced.kind is Box:
+        return [*traced.centre, *(traced.axes[k][k] for k in range(traced.dim))]
+    return list(traced.centre)

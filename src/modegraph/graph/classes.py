@@ -1,0 +1,203 @@
+"""Continuous classes in a graph: relations instead of single verdicts, and the references named so far."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modegraph.certify.continuous import ContinuousReferences
+from modegraph.certify.moments import at_state
+from modegraph.certify.proof import SwitchProof, certified_switch
+from modegraph.certify.references import Parameter, parameter_text
+from modegraph.certify.relation import Part, Relation
+from modegraph.certify.target_class import target_class
+from modegraph.certify.verdict import Status, Verdict, Witness
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Box
+from modegraph.model.target import Target
+from modegraph.reach.start import Floats
+
+Key = tuple[str, int]
+"""A mode and the position of a reference in its finite class; 0 for a continuous class or a Target."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """What is known of the switch between two nodes, one of them a whole continuous class.
+
+    ``relation`` is a text where there can be none. ``slack`` of the constraints and ``horizon`` in
+    seconds (None: as far as the flowpipe went) belong to the source.
+    """
+
+    relation: Relation | str
+    slack: Mapping[str, float]
+    horizon: float | None
+
+
+@dataclass
+class Classes:
+    """The continuous classes of a graph.
+
+    Attributes
+    ----------
+    regions : mode name to the Box of its parameters
+    links : every ordered pair of nodes with a continuous class in it
+    named : mode name to the references of its class that were asked for, in that order
+    """
+
+    regions: Mapping[str, Box]
+    links: Mapping[tuple[Key, Key], Link]
+    named: dict[str, list[Floats]] = field(default_factory=dict)
+    _position: dict[tuple[str, bytes], int] = field(default_factory=dict)
+    _pairs: dict[tuple[str, str], tuple[int, int, dict[tuple[Key, Key], Verdict]]] = field(default_factory=dict)
+    _references: dict[tuple[str, str], ContinuousReferences] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in self.regions:
+            self.named.setdefault(name, [])
+
+    def position(self, name: str, p: Floats) -> int:
+        """Position of a reference among those named of its class; it is remembered."""
+        key = name, p.tobytes()
+        if key not in self._position:
+            self._position[key] = len(self.named[name])
+            self.named[name].append(p)
+        return self._position[key]
+
+    def involves(self, *names: str) -> bool:
+        return any(name in self.regions for name in names)
+
+    def references(self, i: str, j: str, parameters: Mapping[str, Sequence[Parameter]]) -> ContinuousReferences:
+        """R^ij for two modes, one of them with a continuous class."""
+        if (i, j) not in self._references:
+            relations = {
+                (s[1], t[1]): link.relation
+                for (s, t), link in self.links.items()
+                if s[0] == i and t[0] == j and isinstance(link.relation, Relation)
+            }
+            sides = [self.regions[name] if name in self.regions else tuple(parameters[name]) for name in (i, j)]
+            self._references[i, j] = ContinuousReferences(sides[0], sides[1], relations, i == j)
+        return self._references[i, j]
+
+    def pairs(self, i: str, j: str, parameters: Mapping[str, Sequence[Parameter]]) -> Mapping[tuple[Key, Key], Verdict]:
+        """Verdicts of the certified pairs of named references."""
+        left, right = parameters[i], parameters[j]
+        known = self._pairs.get((i, j), (0, 0, {}))
+        if known[:2] == (len(left), len(right)):
+            return known[2]
+        found = dict(known[2])
+        for (s, t), link in self.links.items():
+            if s[0] != i or t[0] != j or isinstance(link.relation, str):
+                continue
+            sources = range(len(left)) if i in self.regions else [s[1]]
+            targets = range(len(right)) if j in self.regions else [t[1]]
+            grid = [(a, b) for a in sources for b in targets if (a >= known[0] or b >= known[1]) and (i, a) != (j, b)]
+            if not grid:
+                continue
+            source = self._values(i, [a for a, _ in grid])
+            target = self._values(j, [b for _, b in grid])
+            crossings = link.relation.crossings(source, target)
+            for k in np.flatnonzero(crossings.certified):
+                a, b = grid[k]
+                gauge, latest = float(crossings.gauge[k]), float(crossings.latest[k])
+                found[(i, a), (j, b)] = _certified(link, gauge, latest, float(crossings.energy[k]))
+        self._pairs[i, j] = len(left), len(right), found
+        return found
+
+    def _values(self, name: str, positions: Sequence[int]) -> Floats:
+        if name not in self.regions:
+            return np.zeros((len(positions), 0))
+        return np.array([self.named[name][k] for k in positions]).reshape(len(positions), self.regions[name].dim)
+
+    def verdict(self, source: Key, target: Key) -> Verdict:
+        """One pair of references, for continuous classes by their position among those named."""
+        link = self.links[self._node(source), self._node(target)]
+        if isinstance(link.relation, str):
+            return Verdict(Status.UNDECIDED, link.relation, horizon=link.horizon)
+        left, right = self._values(source[0], [source[1]]), self._values(target[0], [target[1]])
+        crossings = link.relation.crossings(left, right)
+        gauge = float(crossings.gauge[0])
+        if gauge <= 1.0:
+            return _certified(link, gauge, float(crossings.latest[0]), float(crossings.energy[0]))
+        if link.relation.refuted(left, right)[0]:
+            return _resting(link.relation, left, right)
+        return _missed(link, gauge)
+
+    def existential(
+        self, i: str, j: str, r_i: Floats | None, r_j: Floats | None, refs: ContinuousReferences
+    ) -> Verdict:
+        """Whether some pair is certified, every pair refuted, or neither; a reference given is kept."""
+        horizon = next(link.horizon for (s, t), link in self.links.items() if s[0] == i and t[0] == j)
+        texts = [
+            link.relation for (s, t), link in self.links.items()
+            if s[0] == i and t[0] == j and isinstance(link.relation, str)
+        ]  # fmt: skip
+        best = refs.best(r_i, r_j)
+        if best is None:
+            return Verdict(Status.UNDECIDED, texts[0] if texts else "no reference is left", horizon=horizon)
+        key, left, right, gauge = best
+        link = self.links[(i, key[0]), (j, key[1])]
+        assert isinstance(link.relation, Relation)
+        where = f"r_i = {_text(left)}, r_j = {_text(right)}"
+        if gauge <= 1.0:
+            times, energies = link.relation.extremes
+            proof = SwitchProof(0.0, times, 0.0, 0.0, energies, dict(link.slack), len(link.relation.parts))
+            verdict = certified_switch(proof, link.horizon)
+            reason = f"certified for a continuous set of references, among them {where}"
+            return Verdict(
+                verdict.status, reason, time=verdict.time, margin=1.0 - gauge, slack=verdict.slack,
+                horizon=verdict.horizon, energy=verdict.energy, window=verdict.window,
+            )  # fmt: skip
+        if not texts and refs.all_refuted(r_i, r_j):
+            told = _resting(link.relation, left[None], right[None])
+            reason = f"refuted for all references; closest {where}: {told.reason}"
+            return Verdict(Status.REFUTED, reason, margin=1.0 - gauge, witness=told.witness)
+        told = _missed(link, gauge)
+        return Verdict(Status.UNDECIDED, f"{told.reason}; closest {where}", margin=told.margin, horizon=link.horizon)
+
+    def entered(self, name: str, mode: Mode | Target, x: Floats) -> ContinuousReferences | None:
+        """The references under which a mode may be entered from x (n,), proved; None: none is found."""
+        goal = target_class(mode, None, len(x))
+        relation = Relation(0, goal, (Part((at_state(x, goal),)),), None)
+        refs = ContinuousReferences((None,), self.regions[name], {(0, 0): relation}, False)
+        best = refs.best(None, None)
+        return refs if best is not None and best[3] <= 1.0 else None
+
+    def _node(self, key: Key) -> Key:
+        return (key[0], 0) if key[0] in self.regions else key
+
+
+def _text(p: NDArray[np.float64]) -> str:
+    return parameter_text(p) if len(p) else "the only one"
+
+
+def _certified(link: Link, gauge: float, latest: float, energy: float) -> Verdict:
+    parts = len(link.relation.parts) if isinstance(link.relation, Relation) else 1
+    proof = SwitchProof(0.0, latest, 1.0 - gauge, 0.0, energy, dict(link.slack), parts)
+    return certified_switch(proof, link.horizon)
+
+
+def _missed(link: Link, gauge: float) -> Verdict:
+    if not np.isfinite(gauge):
+        reason = "the flowpipe of the source does not get far enough for any instant to count"
+        return Verdict(Status.UNDECIDED, reason, horizon=link.horizon)
+    within = "" if link.horizon is None else f" within {link.horizon:g} s"
+    reason = (
+        f"no common time was found{within}: at best the worst part of the starts reaches "
+        f"{gauge:.3g} times the size of the target (1 is needed)"
+    )
+    return Verdict(Status.UNDECIDED, reason, margin=1.0 - gauge, horizon=link.horizon)
+
+
+def _resting(relation: Relation, source: Floats, target: Floats) -> Verdict:
+    assert relation.rest is not None
+    x0 = np.array(relation.rest.at(source)[0][0])
+    reason = (
+        f"the centre {parameter_text(x0)} of the start set is an equilibrium without disturbance and lies outside the "
+        "target: that trajectory never reaches it"
+    )
+    witness = Witness(x0, None, {}, 0.0, "trapped", source[0], target[0])
+    return Verdict(Status.REFUTED, reason, witness=witness, horizon=None)

@@ -1,0 +1,58 @@
+"""One reference of a class flowpipe: its polynomials with the parameters fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..model.class_start import StartClass
+from ..model.mode import Mode
+from ..model.start import mode_start
+from .class_chart import require_same_start
+from .compiled import CompiledMode
+from .flow import Flow
+from .slices import Slice
+from .substitution import Substitution, holds
+
+Floats = NDArray[np.float64]
+
+
+class Restrictor:
+    """Restricts slices of the flows of a mode with a continuous class of references to one of them."""
+
+    def __init__(self, mode: Mode, compiled: CompiledMode) -> None:
+        self._mode = mode
+        self._start = compiled.start
+        self._chart = compiled.whole().chart
+        self._checked: set[bytes] = set()
+
+    def parameters(self, r: ArrayLike) -> Floats:
+        """The parameters (k,) a user names.
+
+        Raises
+        ------
+        ModegraphError
+            If there is no such reference, or its start set in floats is not that of the class.
+        """
+        p = self._mode.find(r)
+        assert p is not None
+        if isinstance(self._start, StartClass) and p.tobytes() not in self._checked:
+            owner = f"mode {self._mode.label_of(p)!r}"
+            require_same_start(self._start, self._chart, mode_start(self._mode, p), p, owner)
+            self._checked.add(p.tobytes())
+        return p
+
+    def restricted(self, slices: Sequence[Slice], p: Floats) -> list[Slice]:
+        """Slices of the pieces that hold p, with the parameters fixed."""
+        known: dict[Flow, Substitution] = {}
+        found = []
+        for s in slices:
+            flow = s.slicer.flow
+            if not holds(flow.piece, p):
+                continue
+            if flow not in known:
+                known[flow] = Substitution(flow, p)
+            found.append(Slice(s.slicer, *known[flow](s.p, s.out)))
+        return found

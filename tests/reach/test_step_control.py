@@ -1,0 +1,30 @@
+"""Steps of a class of references are short where the remainder would feed itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modegraph.reach.compiled import compile_mode
+from modegraph.reach.start import Chart, Piece
+from modegraph.reach.step_control import LONGER, SLOW_RATE, feeding_cap
+from tests.soundness.families import pendulum
+
+
+def outcome(rest: float, rate: float, share: float = 0.9) -> tuple[object, ...]:
+    G = np.full((1, 2, 1), 1e-3)
+    control = np.array([0.0, 0.0, 0.0, rate, share])
+    return 0, 0, None, G, None, None, np.full(2, rest), control
+
+
+def test_only_a_remainder_that_feeds_itself_shortens_steps() -> None:
+    piece = compile_mode(pendulum().mode, None).whole()
+    assert feeding_cap(piece, outcome(1e-3, 1.0, share=0.1)) == LONGER
+    assert feeding_cap(piece, outcome(1e-9, 1.0)) > LONGER
+    assert SLOW_RATE <= feeding_cap(piece, outcome(1e-3, 1.0)) < 0.5
+    assert feeding_cap(piece, outcome(1e-3, 0.5 * SLOW_RATE)) == LONGER
+
+
+def test_one_reference_keeps_its_steps() -> None:
+    nothing = np.zeros(0)
+    alone = Piece.whole(Chart(np.zeros(2), np.eye(2), False, None, nothing, nothing))
+    assert feeding_cap(alone, outcome(1e-3, 1.0)) == LONGER
