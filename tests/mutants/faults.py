@@ -75,6 +75,20 @@ FAULTS = (
         (NODES + "test_random_expressions",),
     ),
     Fault(
+        "the argument of a kink is believed to move along its chord",
+        "enclosure/remainder.py",
+        "            bend += chord_distance(j) * norms[j, d]\n    lo = min(",
+        "            bend += 0.0\n    lo = min(",
+        (NODES + "test_a_kink_that_is_crossed_between_the_ends",),
+    ),
+    Fault(
+        "the argument of a kink is looked at before the step only",
+        "enclosure/remainder.py",
+        "    lo = min(c[0, 0] - spread0, last - spread1) - bend",
+        "    lo = c[0, 0] - spread0 - bend",
+        (NODES + "test_random_expressions", NODES + "test_a_set_that_moves_onto_a_kink"),
+    ),
+    Fault(
         "a relu across its kink is believed to be its chord",
         "enclosure/remainder.py",
         "R[q] = (gap + abs(alpha) * (R[a] + r)",
