@@ -84,3 +84,13 @@ def test_why_there_is_no_funnel_is_said_once(rate: float, both: bool) -> None:
     reason = mg.build([slow], budget=20.0).check("slow").reason
     assert reason.count("the loop does not settle") == 1
     assert ("no funnel either: the loop does not settle" in reason) == both
+
+
+def test_starts_on_both_sides_of_a_limit_are_cut_until_they_are_proved() -> None:
+    plant = mg.System(lambda x, u: np.array([x[1], u[0] - 0.3 * np.sin(x[0])]), states="position speed", inputs="force")
+    wide = mg.Mode(
+        "wide", plant, controller=lambda x, r: np.clip(-9.0 * (x[:1] - r) - 6.0 * x[1:], -1.5, 1.5),
+        reference=mg.setpoint([0.0]), start=mg.Ball([0.0, 0.0], 0.4), constraints=lambda x: {"speed": abs(x[1]) <= 1.5},
+    )  # fmt: skip
+    check = mg.build([wide], horizon=8.0).check("wide")
+    assert check.status is mg.Status.CERTIFIED, check.reason

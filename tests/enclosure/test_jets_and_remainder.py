@@ -284,3 +284,44 @@ def test_terms_that_cancel_do_not_add_up() -> None:
     made.add(ops.SUB, made.add(ops.MULC, 0, const=3.0), made.add(ops.MULC, 0, const=2.0))
     _, R = far_input(made, 0.5)
     assert 0.5 <= R[-1] <= 0.5 * (1.0 + 1e-9)
+
+
+def over_a_kink(op: int, start: np.ndarray) -> tuple[np.ndarray, float]:
+    """P and R of the last node: relu or step of the first variable, or where it is positive."""
+    made = Program()
+    made.apply(op, 0, 1, 0, 0.0)
+    points = [[Fraction(a), Fraction(0), Fraction(s, 16), *[Fraction(0)] * 2] for a in (-1, 0, 1) for s in range(17)]
+    check(made, start, np.zeros(2), points)
+    P, R, _ = stored(made, start, np.zeros(2))
+    return P, R[-1]
+
+
+@pytest.mark.parametrize("op", [ops.RELU, ops.STEP, ops.WHERE])
+def test_a_kink_that_is_crossed_between_the_ends(op: int) -> None:
+    """8 s - 8 s^2 - 1 is negative at both ends and 1 in the middle."""
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, :3, 0] = -1.0, 8.0, -8.0
+    for side in (1.0, -1.0):
+        assert over_a_kink(op, side * start)[1] > 0.3
+
+
+@pytest.mark.parametrize("op", [ops.RELU, ops.STEP, ops.WHERE])
+def test_a_set_that_moves_onto_a_kink(op: int) -> None:
+    """.5 - s and s - .5, with a share of xi."""
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, :2, 0] = 0.5, -1.0
+    start[0, 0, TABLE.linear[0]] = 0.25
+    for side in (1.0, -1.0):
+        assert over_a_kink(op, side * start)[1] > 0.1
+
+
+@pytest.mark.parametrize("op", [ops.RELU, ops.STEP, ops.WHERE])
+def test_a_set_that_shrinks_away_from_a_kink(op: int) -> None:
+    """1.01 + (1 - s) xi is at least .01, though its powers of time add up to more than 1.01."""
+    start = np.zeros((2, K + 1, TABLE.size))
+    start[0, 0, 0] = 1.01
+    start[0, :2, TABLE.linear[0]] = 1.0, -1.0
+    P, R = over_a_kink(op, start)
+    assert R <= 1e-13
+    if op == ops.RELU:
+        np.testing.assert_array_equal(P[-1], P[0])

@@ -11,6 +11,9 @@ from scipy.integrate import solve_ivp
 
 import modegraph as mg
 from modegraph.reach import flowpipe as module
+from modegraph.reach.chain import nonlinear_variable
+from modegraph.reach.compiled import compile_mode
+from modegraph.reach.flow import Flow, Order
 from modegraph.reach.flowpipe import Flowpipe
 
 VDP_SPREAD = np.array([0.104, 0.436])
@@ -295,6 +298,30 @@ def test_a_cut_that_reaches_the_end_is_kept() -> None:
     assert pipe.complete, pipe.reason
     assert pipe.pieces == 2
     assert pipe.steps > 2
+
+
+def apart(lo: float) -> mg.Mode:
+    """x' = 1 / x and y' = 1 / y, alike."""
+    return field_mode(lambda x: np.array([1.0 / x[0], 1.0 / x[1]]), "x y", mg.Box([lo, lo], [2.0, 2.0]))
+
+
+def test_two_variables_that_need_a_cut_each() -> None:
+    """Neither cut alone gets any further."""
+    pipe = mg.flowpipe(apart(0.2), horizon=0.3)
+    assert pipe.complete, pipe.reason
+    assert pipe.pieces == 4
+
+
+def test_equal_variables_are_cut_in_turn() -> None:
+    mode = field_mode(lambda x: -x, "x y z", mg.Box([-1.0] * 3, [1.0] * 3))
+    c = compile_mode(mode, None, observed=False)
+    piece, cuts = c.whole(), []
+    for _ in range(6):
+        flow = Flow(c.fields, piece, c.w_centre, c.w_radius, Order(1, 0), names=c.loop.names)
+        flow.run(0.5)
+        cuts.append(nonlinear_variable(flow))
+        piece = piece.split(cuts[-1])[0]
+    assert cuts == [0, 1, 2, 0, 1, 2]
 
 
 def test_a_heavy_degree_is_for_what_is_complete_but_very_loose(monkeypatch: pytest.MonkeyPatch) -> None:

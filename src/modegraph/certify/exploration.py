@@ -207,8 +207,10 @@ class Exploration:
         children: list[Findings] = []
         for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
             children.append(part)
-            if piece.chart.sublevel is None and not part.empty and not better(part, found, again, check_again):
+            lost = not part.empty and not better(part, found, again, check_again)
+            if lost and piece.chart.sublevel is None and flow.astride is None:
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
+                # At a kink a cut leaves a part astride of it, which may get no further yet.
                 return found
         return merge(found, children, again, check_again)
 

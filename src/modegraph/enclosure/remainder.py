@@ -35,6 +35,7 @@ from .elementary import taylor_coefficients, taylor_errors
 from .jets import PLAIN, TOO_WIDE
 from .polynomial import KERNEL, multiply_into
 from .rounding import LIBM, TINY, UNIT, UP
+from .variational import chord_distance
 
 
 @njit(**KERNEL)
@@ -268,10 +269,8 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
         else:
             t = a if op != WHERE else ops[q, 3]
             mid = P[t, 0, 0]
-            rest = (A[t] - norms[t, 0, 0] * (1.0 - 2.0 * (UP - 1.0))) * UP + R[t] * UP
-            rest += 4.0 * UNIT * (abs(mid) + rest)
-            lo = mid - rest
-            hi = mid + rest
+            lo, hi = range_of(P[t], norms[t], A[t], R[t])
+            rest = max(hi - mid, mid - lo)
             ranges[q, 0] = lo
             ranges[q, 1] = hi
             if op == STEP:
@@ -312,6 +311,38 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             if bad < 0:
                 bad = q
     return bad, A, local
+
+
+@njit(**KERNEL)
+def range_of(c, norms, size, radius):
+    """Bounds (lo, hi) of everything within ``radius`` of a stored polynomial c (K+1, N), at any s in [0, 1].
+
+    ``norms`` (K+1, n+1) of c by degree, ``size`` their sum. The polynomial stays close to the chord of its
+    ends, where the powers of time are summed with their signs; a set that moves or shrinks fills no more.
+    """
+    last = 0.0
+    spread0 = 0.0
+    spread1 = 0.0
+    for k in range(c.shape[1]):
+        s = 0.0
+        for j in range(c.shape[0]):
+            s += c[j, k]
+        if k == 0:
+            last = s
+        else:
+            spread0 += abs(c[0, k])
+            spread1 += abs(s)
+    bend = 0.0
+    for j in range(2, c.shape[0]):
+        for d in range(norms.shape[1]):
+            bend += chord_distance(j) * norms[j, d]
+    lo = min(c[0, 0] - spread0, last - spread1) - bend
+    hi = max(c[0, 0] + spread0, last + spread1) + bend
+    # Every sum above has at most as many roundings as UP allows for, of terms that add up to size.
+    slack = radius * UP + 4.0 * (UP - 1.0) * size + 4.0 * UNIT * (abs(lo) + abs(hi)) + TINY
+    rest = (size - norms[0, 0] * (1.0 - 2.0 * (UP - 1.0))) * UP + radius * UP
+    rest += 4.0 * UNIT * (abs(c[0, 0]) + rest)
+    return max(lo - slack, c[0, 0] - rest), min(hi + slack, c[0, 0] + rest)
 
 
 @njit(**KERNEL)

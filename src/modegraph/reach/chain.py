@@ -15,6 +15,9 @@ from .parallelotope import mode_gap
 from .restart import WIDE_GAP, restarted
 from .start import Piece
 
+EQUAL = 1e-6
+"""Shares that differ by less, relatively, are equal."""
+
 
 class Chain:
     """Flows of one piece; each but the first continues from an enclosure of the end of the one before."""
@@ -88,7 +91,8 @@ class Chain:
 
 
 def nonlinear_variable(flow: Flow) -> int:
-    """The variable with the largest share in the nonlinear terms early in the flow, or else in the width."""
+    """The variable to cut: with the largest share in a kink the starts are astride of, else in the nonlinear
+    terms early in the flow, else in the width. Among equals the one that was cut least."""
     p, _ = flow.set_at(max(1, len(flow.steps) // 3) if flow.steps else 0)
     exponents = flow.bounds.exponents
     weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
@@ -98,4 +102,6 @@ def nonlinear_variable(flow: Flow) -> int:
         reads = exponents[:, v] > 0
         for row, used in enumerate((reads & higher, reads)):
             share[row, v] = float((np.abs(p[:, used]) * exponents[used, v]).sum(axis=1) @ weight)
-    return int(np.argmax(share[0] if share[0].any() else share[1]))
+    chosen = flow.astride if flow.astride is not None else share[0] if share[0].any() else share[1]
+    largest = chosen >= (1.0 - EQUAL) * chosen.max()
+    return int(np.argmax(np.where(largest, flow.piece.radius, -1.0)))

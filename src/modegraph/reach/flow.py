@@ -26,6 +26,7 @@ from .error_table import error_table
 from .field import Field
 from .framing import generator_box, into_frame, out_of_frame, thinned
 from .grid import next_instant
+from .passage import Passages
 from .pointwise import evaluate_over, workspace
 from .records import Failure, Order, Step
 from .start import Piece
@@ -154,6 +155,9 @@ class Flow:
         self.next_restart = RESTART_STEPS
         self._sizes: list[float] = []
         self._longest = 0.0
+        self._passages: dict[int, Passages] | None = {}
+        self.astride: Floats | None = None
+        """Shares (m,) of the set variables in a kink that only some of the starts had passed."""
 
     # -- the start -------------------------------------------------------------------------------
 
@@ -236,6 +240,10 @@ class Flow:
             h = t1 - self.time
             outcome = self._attempt(fld, h)
             status, node, p, G, tube, bend, rest, control = outcome
+            passed = self._pass_kinks(h, stop)
+            if passed is not None:
+                self._append(passed)
+                return True
             scale = TOLERANCE * (1.0 + np.abs(self._p[:, 0]).max())
             if status == DONE and np.isfinite(control).all():
                 rate, floor = control[0] / h, max(scale, 0.3 * control[1] / h)
@@ -273,11 +281,21 @@ class Flow:
             return False
         self.feedback = float(control[4])
         self._ybox = rest
-        self._record(fld, t1, p, G, tube, bend, seen)
+        self._record(t1, p, G, tube, bend, seen)
         if not np.isfinite(p).all() or self._runs_away(G):
             self._fail(fld, NO_CONTRACTION, 0)
             return False
         return True
+
+    def _pass_kinks(self, h: float, stop: float) -> Step | None:
+        """Where the step just tried crosses a kink: one that passes it as a whole, if possible."""
+        if self._passages is None:
+            return None
+        if self.segment not in self._passages:
+            self._passages[self.segment] = Passages(self)
+        passages = self._passages[self.segment]
+        ranges = self._spaces[(self.segment, "f")]["ranges"]
+        return passages.attempt(self, h, stop) if passages.near(ranges) else None
 
     def _rate_cap(self, fld: Field) -> float:
         if not self.w_radius.any():
@@ -328,7 +346,6 @@ class Flow:
 
     def _record(
         self,
-        fld: Field,
         t1: float,
         p: Floats,
         G: Floats,
@@ -338,17 +355,19 @@ class Flow:
     ) -> None:
         face_upper, mean, mean_radius, tracking = seen
         h = t1 - self.time
-        self._energy = self._energy + h * mean
-        rounding = 4.0 * UNIT * float(np.abs(self._energy).sum() + h * np.abs(mean).sum())
-        self._energy_radius = (self._energy_radius + h * mean_radius + rounding) * (1.0 + 8.0 * UNIT)
-        self.steps.append(
-            Step(self.time, t1, p, G, tube, bend, face_upper, self._energy, self._energy_radius, tracking, self.segment)
-        )
+        energy = self._energy + h * mean
+        rounding = 4.0 * UNIT * float(np.abs(energy).sum() + h * np.abs(mean).sum())
+        radius = (self._energy_radius + h * mean_radius + rounding) * (1.0 + 8.0 * UNIT)
+        self._append(Step(self.time, t1, p, G, tube, bend, face_upper, energy, radius, tracking, self.segment))
+
+    def _append(self, step: Step) -> None:
+        self.steps.append(step)
         if len(self.steps) > 1:
             # Only the last remainder goes on; of the others the targets need no more than this.
             self.steps[-2].G = thinned(self.steps[-2].G, 0 if self.lean else 1 + self.piece.variables)
-        self._p, self._G, self._ebox, self.time = p, G, tube, t1
-        if t1 >= fld.end:
+        self._p, self._G, self._ebox, self.time = step.p, step.G, step.tube, step.end
+        self._energy, self._energy_radius = step.energy, step.energy_radius
+        if step.end >= self.fields[self.segment].end:
             self.segment += 1
             self.h = min(self.h, 0.05)
 

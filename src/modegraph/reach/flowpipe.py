@@ -30,11 +30,13 @@ from .start import Piece
 Floats = NDArray[np.float64]
 
 MOST_PIECES = 32
-DEEPEST_CUT = 7
+DEEPEST_CUT = 9
 MOST_LOOSE_PIECES, WORTH_CUTTING = 8, 0.8
 """A class of references that is very loose is cut into at most so many, while halves are by this much tighter."""
 PROGRESS = 1.05
 """A cut or a higher degree must get this much further, or it is the last one."""
+PATIENT_DEPTH = 2
+"""Pieces cut less often than this may get no further: two variables may need a cut each."""
 DEFAULT_HORIZON = 10.0
 """Seconds, for a set-point mode without a horizon."""
 
@@ -294,8 +296,7 @@ class Cutting:
                 stuck = "; no more are tried"
                 break
             children = self._halves(worst, ladder)
-            ended = [child.chain.time for child in children if child.chain.failure]
-            if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
+            if not self._gained(worst.chain, [child.chain for child in children]):
                 stuck = "; cutting it gets no further"
                 break
             # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
@@ -319,6 +320,16 @@ class Cutting:
                 break
             parts = [part for part in parts if part is not loosest] + children
         return parts
+
+    def _gained(self, whole: Chain, parts: Sequence[Chain]) -> bool:
+        """Whether all parts get further than the whole did.
+
+        At a kink one is enough, for a cut leaves a part astride of it.
+        """
+        if whole.piece.depth < PATIENT_DEPTH:
+            return True
+        further = [not part.failure or part.time > PROGRESS * whole.time for part in parts]
+        return any(further) if whole.flows[0].astride is not None else all(further)
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""

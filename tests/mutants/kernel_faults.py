@@ -1,0 +1,238 @@
+"""Faults of the validated arithmetic."""
+
+from __future__ import annotations
+
+from tests.mutants.fault import Fault
+
+NODES = "tests/enclosure/test_jets_and_remainder.py::"
+OPERATIONS = "tests/enclosure/test_operations.py"
+STEP = "tests/enclosure/test_step.py"
+REMAINDER = "tests/enclosure/test_remainder_of_a_step.py"
+GENERATORS = "tests/enclosure/test_generators.py"
+
+KERNEL_FAULTS = (
+    Fault(
+        "the remainder of a product forgets what it truncates",
+        "enclosure/remainder.py",
+        "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]",
+        "own = gamma * A[a] * A[b]",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "the remainder of a product forgets its rounding",
+        "enclosure/remainder.py",
+        "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]",
+        "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0))",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "an adjoint follows one factor of a product only",
+        "enclosure/adjoint.py",
+        "                _add_product(low, high, b, c, d, below[a], above[a])\n",
+        "",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "an adjoint takes the slopes at the centre",
+        "enclosure/adjoint.py",
+        "        r += OUT * (abs(middle) + r)\n",
+        "        r = 0.0\n",
+        (NODES + "test_sensitivities_hold_over_the_whole_range",),
+    ),
+    Fault(
+        "an adjoint forgets what the node adds itself",
+        "enclosure/adjoint.py",
+        "(local[q] if follows else R[q])",
+        "(0.0 if follows else R[q])",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "the truncated part leaves out high powers of time",
+        "enclosure/remainder.py",
+        "                r += w * ta[i, 0] * tb[j, 0]",
+        "                r += 0.0",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "a composition forgets the Lagrange term",
+        "enclosure/remainder.py",
+        "(total + horner * rounding + lagrange * rk * r)",
+        "(total + horner * rounding)",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "a reciprocal is bounded where its argument may vanish",
+        "enclosure/remainder.py",
+        "if miss < 1.0 - 1e-9:",
+        "if miss < np.inf:",
+        (NODES + "test_undefined_arguments_are_unbounded", NODES + "test_random_expressions"),
+    ),
+    Fault(
+        "the cosine gets no remainder",
+        "enclosure/remainder.py",
+        "            R[b] = R[q]\n",
+        "            R[b] = 0.0\n",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "the argument of a kink is believed to move along its chord",
+        "enclosure/remainder.py",
+        "            bend += chord_distance(j) * norms[j, d]\n    lo = min(",
+        "            bend += 0.0\n    lo = min(",
+        (NODES + "test_a_kink_that_is_crossed_between_the_ends",),
+    ),
+    Fault(
+        "the argument of a kink is looked at before the step only",
+        "enclosure/remainder.py",
+        "    lo = min(c[0, 0] - spread0, last - spread1) - bend",
+        "    lo = c[0, 0] - spread0 - bend",
+        (NODES + "test_random_expressions", NODES + "test_a_set_that_moves_onto_a_kink"),
+    ),
+    Fault(
+        "a relu across its kink is believed to be its chord",
+        "enclosure/remainder.py",
+        "R[q] = (gap + abs(alpha) * (R[a] + r)",
+        "R[q] = (abs(alpha) * (R[a] + r)",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "a where takes one branch although both occur",
+        "enclosure/remainder.py",
+        "if (lo > 0.0 or hi < 0.0) else np.inf",
+        "if rest < np.inf else np.inf",
+        (NODES + "test_random_expressions", OPERATIONS),
+    ),
+    Fault(
+        "the derivative of the cosine has the wrong sign",
+        "enclosure/jets.py",
+        "sign = -1.0 if op == COS else 1.0",
+        "sign = 1.0",
+        (NODES + "test_random_expressions",),
+    ),
+    Fault(
+        "UP has half its margin",
+        "enclosure/rounding.py",
+        "UP = 1.0 + math.nextafter(gamma(MAX_ROUNDINGS + 2), math.inf)",
+        "UP = 1.0 + 0.5 * math.nextafter(gamma(MAX_ROUNDINGS + 2), math.inf)",
+        ("tests/enclosure/test_rounding.py",),
+    ),
+    Fault(
+        "gamma is half as large",
+        "enclosure/rounding.py",
+        "    ku = k * UNIT\n",
+        "    ku = 0.5 * k * UNIT\n",
+        ("tests/enclosure/test_rounding.py",),
+    ),
+    Fault(
+        "a step is accepted without its bootstrap",
+        "enclosure/step.py",
+        "                    inside = False",
+        "                    inside = True",
+        (REMAINDER,),
+    ),
+    Fault(
+        "the tube of a step holds its end only",
+        "enclosure/step.py",
+        "need[r] = (max(z[r], end * UP) + s) * UP",
+        "need[r] = (end * UP + s) * UP",
+        (REMAINDER,),
+    ),
+    Fault(
+        "the Jacobian does not swing with the error",
+        "enclosure/step.py",
+        "RJ[r] = (fixed[r] + 0.5 * max(0.0, s)) * UP",
+        "RJ[r] = fixed[r] * UP",
+        (REMAINDER,),
+    ),
+    Fault(
+        "the defect of the Taylor polynomial is left out",
+        "enclosure/step.py",
+        "s = defect[r] + h * miss_b[r] + h * push[r]",
+        "s = h * miss_b[r] + h * push[r]",
+        (REMAINDER,),
+    ),
+    Fault(
+        "the columns of the disturbance are ignored",
+        "enclosure/disturbance.py",
+        "first[j, i, l] = h * radius[j] * (B[j, i, l] + image[i, l] / 2.0 + again[i, l] / 6.0)",
+        "first[j, i, l] = 0.0",
+        (STEP,),
+    ),
+    Fault(
+        "the disturbance has no rest beyond its two columns",
+        "enclosure/disturbance.py",
+        "            s = rest + high[i]\n",
+        "            s = 0.0\n",
+        (REMAINDER,),
+    ),
+    Fault(
+        "the mean of the disturbance matrix counts as the matrix",
+        "enclosure/disturbance.py",
+        "            miss[i] += off * UP * radius[j]\n",
+        "",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "transported generators lose their high degrees",
+        "enclosure/variational.py",
+        "                        lost[r] += nF[r, c, d] * tail[c, q + 1 - d]\n",
+        "                        lost[r] += 0.0\n",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "the fundamental matrix ignores the radius of the Jacobian",
+        "enclosure/variational.py",
+        "                e += RJ[r * n + k] * sup[k, c] * h\n",
+        "",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "the fundamental matrix drops powers of time unseen",
+        "enclosure/variational.py",
+        "                            e += h * si * tails[j, k, c, 0] / (i + j + 1)",
+        "                            e += 0.0",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "the exponential series ends without its rest",
+        "enclosure/variational.py",
+        "    return (W + rest) * UP, norm",
+        "    return W, norm",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "merged generators do not grow",
+        "enclosure/variational.py",
+        "grow[a] = (grow[a] + abs(c) * grow[b]) * (1.0 + 4.0 * UNIT)",
+        "grow[a] = grow[a] * (1.0 + 4.0 * UNIT)",
+        (GENERATORS,),
+    ),
+    Fault(
+        "the quadratic push forgets the path between both ends",
+        "enclosure/quadratic.py",
+        "0.5 * max(s00, max(s01, s11))",
+        "0.5 * min(s00, s11)",
+        (GENERATORS,),
+    ),
+    Fault(
+        "small generators vanish from the quadratic terms",
+        "enclosure/quadratic.py",
+        "            spread[i] += max(s0, s1) * UP\n",
+        "            spread[i] += 0.0\n",
+        (GENERATORS,),
+    ),
+    Fault(
+        "bisection evaluates even powers at the ends only",
+        "enclosure/ranges.py",
+        "if e % 2 == 0 and lo[v] < 0.0 < hi[v]:",
+        "if e % 2 == 0 and lo[v] < 0.0 < 0.0 * hi[v]:",
+        ("tests/enclosure/test_ranges.py", OPERATIONS),
+    ),
+    Fault(
+        "an observed function is bounded at the ends of a step only",
+        "enclosure/observe.py",
+        "slack[i, 0] = (bend + RQ[o] + rounding) * UP + TINY",
+        "slack[i, 0] = (RQ[o] + rounding) * UP + TINY",
+        ("tests/reach/test_flow.py",),
+    ),
+)
