@@ -42,6 +42,8 @@ VERY_LOOSE = 0.25
 """The same share, above which even a degree with many monomials is tried."""
 MOST_PIECES = 32
 DEEPEST_CUT = 7
+MOST_TRIES = 3
+"""Places where a chain of flows is cut before it is given up."""
 PROGRESS = 1.05
 """A cut or a higher degree must get this much further, or it is the last one."""
 DEFAULT_HORIZON = 10.0
@@ -64,7 +66,7 @@ class Flowpipe:
     states : tuple[str, ...]
         Names of the coordinates of the boxes: states, then memory.
     pieces, steps : int
-        Parts the start set was cut into, and validated steps of all of them.
+        Parts the start set was cut into, at the start or on the way, and validated steps of all of them.
     """
 
     def __init__(self, label: str, states: Sequence[str], horizon: float, chains: Sequence[Chain], stuck: str) -> None:
@@ -72,20 +74,24 @@ class Flowpipe:
         self.horizon = horizon
         self.complete = not any(chain.failure for chain in chains)
         self._label = label
-        self._parts = [[Slicer(flow) for flow in chain.flows] for chain in chains]
+        flows = dict.fromkeys(flow for chain in chains for flow in chain.flows)
+        self._slicers = [Slicer(flow) for flow in flows]
         self._boxes: dict[tuple[float, float], Box] = {}
         begun = all(chain.begun for chain in chains)
         until = min(chain.time for chain in chains)
-        instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
+        instants = np.unique(np.concatenate([slicer.times for slicer in self._slicers]))
         self.times: Floats = instants[instants <= until] if begun else np.zeros(0)
         self.pieces = len(chains)
-        self.steps = sum(chain.steps for chain in chains)
-        pieces = "1 piece" if self.pieces == 1 else f"{self.pieces} pieces"
+        self.steps = sum(len(flow.steps) for flow in flows)
+        starts = len({chain.flows[0] for chain in chains})
+        pieces = f"{starts} piece{'s' * (starts > 1)} of the start set"
+        if self.pieces > starts:
+            pieces += f", cut into {self.pieces} on the way"
         if self.complete:
-            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {self.steps} steps)"
+            self.reason = f"complete until t = {horizon:.6g} s ({pieces}, {self.steps} steps)"
         else:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
-            self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
+            self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces}{stuck})"
 
     def at(self, t: float) -> Box:
         """Box over states, then memory, around every state that is possible at time t (seconds).
@@ -109,8 +115,7 @@ class Flowpipe:
         if a > b:
             raise ModegraphError(f"{self._label}: flowpipe.hull: t0 = {a:.6g} is after t1 = {b:.6g}; exchange them")
         if (a, b) not in self._boxes:
-            slices = [s for part in self._parts for s in _slices(part, a, b)]
-            self._boxes[a, b] = Box(*hull(slices))
+            self._boxes[a, b] = Box(*hull(_slices(self._slicers, a, b)))
         return self._boxes[a, b]
 
     def _instant(self, t: Any, name: str) -> float:
@@ -134,15 +139,16 @@ class Flowpipe:
             )
         return value
 
-    def tubes(self) -> tuple[Floats, list[tuple[Floats, Floats]]]:
-        """For drawing: the grid (k,), and quick boxes (lo, hi) of each piece between instants, (k - 1, n)."""
+    def tubes(self) -> tuple[Floats, list[tuple[slice, Floats, Floats]]]:
+        """For drawing: the grid (k,), and of each flow its intervals and quick boxes (lo, hi) in these."""
         middles = 0.5 * (self.times[:-1] + self.times[1:])
         found = []
-        for part in self._parts:
-            ends = np.concatenate([slicer.times[1:] for slicer in part])
-            boxes = [slicer.steps() for slicer in part if len(slicer.times) > 1]
-            index = np.searchsorted(ends, middles)
-            found.append((np.vstack([b[0] for b in boxes])[index], np.vstack([b[1] for b in boxes])[index]))
+        for slicer in self._slicers:
+            first, last = np.searchsorted(middles, slicer.times[[0, -1]])
+            if first < last:
+                lo, hi = slicer.steps()
+                index = np.searchsorted(slicer.times[1:], middles[first:last])
+                found.append((slice(int(first), int(last)), lo[index], hi[index]))
         return self.times, found
 
     def plot(self, ax: Any = None, dims: int | str | Sequence[int | str] | None = None) -> Any:
@@ -181,13 +187,12 @@ class Flowpipe:
         return f"Flowpipe({self._label}, until={until}, complete={self.complete})"
 
 
-def _slices(part: Sequence[Slicer], a: float, b: float) -> list[Slice]:
-    """Slices of one piece in [a, b]."""
+def _slices(slicers: Sequence[Slicer], a: float, b: float) -> list[Slice]:
+    """Slices in [a, b]; at an instant where a flow continues another, of the other."""
     if a == b:
-        slicer = next(s for s in part if s.times[-1] >= a)
-        return [slicer.at(a)]
+        return [s.at(a) for s in slicers if s.times[0] < a <= s.times[-1] or a == s.times[0] == 0.0]
     found: list[Slice] = []
-    for slicer in part:
+    for slicer in slicers:
         begin, end = max(a, float(slicer.times[0])), min(b, float(slicer.times[-1]))
         if begin < end:
             found += slicer.over(begin, end)
@@ -292,21 +297,37 @@ class _Cutting:
             stuck = ""
             while not stuck and any(part.chain.failure for part in parts):
                 worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-                piece = worst.chain.piece
-                if len(parts) >= MOST_PIECES or piece.depth >= DEEPEST_CUT or piece.variables == 0:
-                    stuck = "; no more are tried"
+                stuck = "; no more are tried"
+                if len(parts) >= MOST_PIECES:
                     break
-                halves = piece.split(nonlinear_variable(worst.chain.flows[0]))
-                children = list(
-                    in_parallel([partial(self._best, half, ladder, worst.rung, worst.top) for half in halves])
-                )
-                ended = [child.chain.time for child in children if child.chain.failure]
-                if min(ended, default=math.inf) <= PROGRESS * worst.chain.time:
+                for k in self._places(worst.chain):
+                    children = self._cut(worst, k, ladder)
+                    ended = [child.chain.time for child in children if child.chain.failure]
+                    if min(ended, default=math.inf) > PROGRESS * worst.chain.time:
+                        # A piece without halves is proved to hold no start; not all are, for the start set
+                        # is not empty.
+                        parts = [part for part in parts if part is not worst] + children
+                        stuck = ""
+                        break
                     stuck = "; cutting it gets no further"
-                    break
-                # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
-                parts = [part for part in parts if part is not worst] + children
         return [part.chain for part in parts], stuck
+
+    def _places(self, chain: Chain) -> list[int]:
+        """Flows of a chain, the start of which may be cut, best first."""
+        pieces = [flow.piece for flow in chain.flows]
+        able = [k for k in chain.weak() if pieces[k].depth < DEEPEST_CUT and pieces[k].variables > 0]
+        return able[:MOST_TRIES]
+
+    def _cut(self, part: _Part, k: int, ladder: Sequence[Order]) -> list[_Part]:
+        """The halves of a part: of the start set, or of a set that flow k > 0 was started again from."""
+        if k == 0:
+            halves = part.chain.piece.split(nonlinear_variable(part.chain.flows[0]))
+            return list(in_parallel([partial(self._best, half, ladder, part.rung, part.top) for half in halves]))
+        return list(in_parallel([partial(self._go_on, part, chain) for chain in part.chain.halves(k)]))
+
+    def _go_on(self, part: _Part, chain: Chain) -> _Part:
+        chain.run(self.end)
+        return replace(part, chain=chain)
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""

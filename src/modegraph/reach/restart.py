@@ -51,19 +51,45 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
     lo = np.concatenate([-np.ones(free), np.min([flow.piece.lo[m:] for flow in flows], axis=0)])
     hi = np.concatenate([np.ones(free), np.max([flow.piece.hi[m:] for flow in flows], axis=0)])
     spent = [float(f.seen_bounds.upper(f.steps[-1].energy) + f.steps[-1].energy_radius) for f in flows]
-    return Flow(
-        fields,
+    return _like(
+        first,
         Piece(chart, lo, hi),
-        first.w_centre,
-        first.w_radius,
-        FULL if full <= MOST_MONOMIALS else CHEAP,
-        names=first.names,
-        stops=first.stops,
+        fields=fields,
+        order=FULL if full <= MOST_MONOMIALS else CHEAP,
         t0=max(flow.time for flow in flows),
         energy=max(spent),
-        longest_step=first.longest_step,
         generation=first.generation + 1,
-        lean=first.lean,
+    )
+
+
+def halved(flow: Flow, variable: int) -> list[Flow]:
+    """Flows that start like a restarted one, each from one half of its piece: together they hold the same."""
+    begin = float(flow.times[0])
+    return [
+        _like(
+            flow, half, fields=flow.fields, order=flow.order, t0=begin, energy=flow.spent, generation=flow.generation
+        )
+        for half in flow.piece.split(variable)
+    ]  # fmt: skip
+
+
+def _like(
+    flow: Flow, piece: Piece, *, fields: Sequence[Field], order: Order, t0: float, energy: float, generation: int
+) -> Flow:
+    """A flow of the same loop and disturbance, from another piece in the coordinates of the states."""
+    return Flow(
+        fields,
+        piece,
+        flow.w_centre,
+        flow.w_radius,
+        order,
+        names=flow.names,
+        stops=flow.stops,
+        t0=t0,
+        energy=energy,
+        longest_step=flow.longest_step,
+        generation=generation,
+        lean=flow.lean,
     )
 
 
