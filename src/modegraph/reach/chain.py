@@ -79,14 +79,20 @@ class Chain:
         What a remainder feeds to itself comes from how much the Jacobian varies over the set: the first flow
         in which that is much is where the set has become too large for all that follow.
         """
-        own = range(self.shared, len(self.flows))
-        fed = [k for k in own if self.flows[k].feedback >= LATE_FEEDBACK]
-        return fed + [k for k in reversed(own) if k not in fed]
+        fed = self.fed()
+        return fed + [k for k in reversed(range(self.shared, len(self.flows))) if k not in fed]
+
+    def fed(self) -> list[int]:
+        """Indices of its own flows whose remainders fed themselves much at the end."""
+        return [k for k in range(self.shared, len(self.flows)) if self.flows[k].feedback >= LATE_FEEDBACK]
 
     def halves(self, k: int) -> list[Chain]:
         """Chains, not yet run, that share the flows before the restarted flow k and go on from its halves."""
-        found = []
-        for flow in halved(self.flows[k], nonlinear_variable(self.flows[k])):
+        whole, found = self.flows[k], []
+        if whole.piece.chart.free > len(whole.p0):
+            # In a parallelotope each axis carries all of the width: half of one of many columns is no half.
+            whole = restarted([self.flows[k - 1]], whole.fields, compact=True) or whole
+        for flow in halved(whole, nonlinear_variable(whole)):
             chain = copy(self)
             chain.flows, chain.shared, chain.failure = [*self.flows[:k], flow], k, ""
             found.append(chain)

@@ -44,6 +44,8 @@ MOST_PIECES = 32
 DEEPEST_CUT = 7
 MOST_TRIES = 3
 """Places where a chain of flows is cut before it is given up."""
+MOST_TIGHTENED, NARROWER = 8, 0.9
+"""Complete chains are cut up to so many pieces, as long as the halves together end narrower by this in some state."""
 PROGRESS = 1.05
 """A cut or a higher degree must get this much further, or it is the last one."""
 DEFAULT_HORIZON = 10.0
@@ -310,7 +312,25 @@ class _Cutting:
                         stuck = ""
                         break
                     stuck = "; cutting it gets no further"
+            if self.disturbed and not stuck:
+                parts = self._tightened(parts, ladder)
         return [part.chain for part in parts], stuck
+
+    def _tightened(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
+        """Complete parts, the widest cut on the way as long as that makes its end much narrower."""
+        while len(parts) < MOST_TIGHTENED:
+            size = np.maximum(_end_widths(parts), 1e-300)
+            widest = max(parts, key=lambda part: float((_end_widths([part]) / size).sum()))
+            places = [k for k in self._places(widest.chain) if k > 0 and k in widest.chain.fed()]
+            if not places:
+                break
+            children = self._cut(widest, places[0], ladder)
+            if any(child.chain.failure for child in children):
+                break
+            if not (_end_widths(children) <= NARROWER * _end_widths([widest])).any():
+                break
+            parts = [part for part in parts if part is not widest] + children
+        return parts
 
     def _places(self, chain: Chain) -> list[int]:
         """Flows of a chain, the start of which may be cut, best first."""
@@ -354,6 +374,12 @@ class _Cutting:
                 break
         assert best is not None
         return best
+
+
+def _end_widths(parts: Sequence[_Part]) -> Floats:
+    """Widths (n,) of the box around the ends of all parts."""
+    boxes = [part.chain.flows[-1].end_box() for part in parts]
+    return np.asarray(np.max([hi for _, hi in boxes], axis=0) - np.min([lo for lo, _ in boxes], axis=0))
 
 
 def _further(chain: Chain, other: Chain) -> bool:

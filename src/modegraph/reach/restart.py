@@ -18,6 +18,7 @@ from ..enclosure.rounding import UNIT
 from .bounds import PolynomialBounds
 from .field import Field
 from .flow import Flow, Order
+from .framing import generator_box
 from .parallelotope import half_widths, principal_axes, tightest
 from .start import Piece
 
@@ -29,14 +30,14 @@ FULL, CHEAP, MOST_MONOMIALS = Order(4, 3), Order(3, 2), 500
 """Degrees after a restart, if that makes at most so many monomials, or else."""
 
 
-def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
+def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool = False) -> Flow | None:
     """A flow that continues ``flows`` from a zonotope around their ends; None if none is found.
 
-    One flow keeps the linear part of its polynomial; several are enclosed together, and start at the
-    latest of their instants: valid only where the loop does not depend on time. ``fields`` may be in
-    another frame than those of the flows.
+    One flow keeps the largest columns of its linear part, unless ``compact``: then one parallelotope holds
+    all. Several are enclosed so together, and start at the latest of their instants: valid only where the
+    loop does not depend on time. ``fields`` may be in another frame than those of the flows.
     """
-    enclosed = _around_one(flows[0], fields) if len(flows) == 1 else None
+    enclosed = None if compact or len(flows) > 1 else _around_one(flows[0], fields)
     if enclosed is None:
         enclosed = _around_all(flows, fields)
     if enclosed is None:
@@ -63,7 +64,7 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
 
 
 def halved(flow: Flow, variable: int) -> list[Flow]:
-    """Flows that start like a restarted one, each from one half of its piece: together they hold the same."""
+    """Flows that start where a restarted one does, from the halves of its piece: together they hold all of it."""
     begin = float(flow.times[0])
     return [
         _like(
@@ -99,20 +100,24 @@ def _candidates(fields: Sequence[Field], bounds: PolynomialBounds, p: Floats, G:
 
 
 def _around_one(flow: Flow, fields: Sequence[Field]) -> tuple[Floats, Floats] | None:
-    """Centre and axes: the linear part of p as it is, and a parallelotope around all the rest."""
+    """Centre and axes: the n largest columns of the linear part as they are, a parallelotope around all the rest."""
     p, G = flow.state_set(len(flow.steps))
     n, free = len(p), flow.piece.chart.free
     linear = flow.bounds.linear_part(p)
-    if not 0 < free <= n:
+    if free == 0:
         return None
+    size = np.abs(linear).sum(axis=1) + generator_box(G)
+    length = np.linalg.norm(linear[:, :free] / np.maximum(size, 1e-300)[:, None], axis=0)
+    kept, small = np.split(np.argsort(-length, kind="stable"), [n])
     below, above = flow.bounds.nonlinear_radius(p)
     middle = 0.5 * (below + above)
     centre = p[:, 0] + middle
     rest = 0.5 * (above - below) + np.abs(linear[:, free:]).sum(axis=1)
     rest = rest * (1.0 + 1e-12) + 8.0 * UNIT * (np.abs(centre) + np.abs(middle))
-    box = np.zeros((n, n, G.shape[2]))
-    box[np.arange(n), np.arange(n), 0] = rest
-    every = np.concatenate([G, box])
+    added = np.zeros((n + len(small), n, G.shape[2]))
+    added[np.arange(n), np.arange(n), 0] = rest
+    added[n:, :, 0] = linear[:, small].T
+    every = np.concatenate([G, added])
     nothing, origin = np.zeros_like(p), np.zeros(n)
     found = tightest([(flow.bounds, nothing, every)], _candidates(fields, flow.bounds, nothing, every), origin)
     if found is None:
@@ -121,7 +126,7 @@ def _around_one(flow: Flow, fields: Sequence[Field]) -> tuple[Floats, Floats] | 
     # The products are rounded entry by entry: what counts is that this very M holds the rest.
     if not (half_widths(flow.bounds, nothing, every, M, origin) <= 1.0).all():
         return None
-    return centre, np.hstack([linear[:, :free], M])
+    return centre, np.hstack([linear[:, np.sort(kept)], M])
 
 
 def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> tuple[Floats, Floats] | None:
