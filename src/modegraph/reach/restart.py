@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,13 +66,9 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool =
 
 def halved(flow: Flow, variable: int) -> list[Flow]:
     """Flows that start where a restarted one does, from the halves of its piece: together they hold all of it."""
+    same: dict[str, Any] = {"fields": flow.fields, "order": flow.order, "generation": flow.generation}
     begin = float(flow.times[0])
-    return [
-        _like(
-            flow, half, fields=flow.fields, order=flow.order, t0=begin, energy=flow.spent, generation=flow.generation
-        )
-        for half in flow.piece.split(variable)
-    ]  # fmt: skip
+    return [_like(flow, half, **same, t0=begin, energy=flow.spent) for half in flow.piece.split(variable)]
 
 
 def _like(
