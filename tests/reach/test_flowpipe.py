@@ -368,7 +368,8 @@ def test_plot() -> None:
     assert pipe.plot(ax, dims=(0, 1)) is ax
     assert ax.get_xlabel() == "x"
     times, parts = pipe.tubes()
-    lo, hi = parts[0]
+    rows, lo, hi = parts[0]
+    assert rows == slice(0, len(times) - 1)
     assert lo.shape == (len(times) - 1, 2)
     box = pipe.hull(float(times[3]), float(times[4]))
     assert (lo[3] <= box.lo).all()

@@ -47,6 +47,18 @@ def points(flow: Flow) -> np.ndarray:
     return powers @ p.T + np.einsum("sg,gik,sk->si", zeta, G, powers[:, : G.shape[2]])
 
 
+def extremes(flow: Flow) -> np.ndarray:
+    """Points of the last set, far out in many directions."""
+    p, G = flow.state_set(len(flow.steps))
+    linear = flow.bounds.linear_part(p)
+    found = []
+    for d in np.random.default_rng(2).normal(size=(50, len(p))):
+        powers = np.prod(np.where(d @ linear < 0.0, -1.0, 1.0) ** flow.table.exponents, axis=1)
+        columns = G @ powers[: G.shape[2]]
+        found.append(p @ powers + np.where(columns @ d < 0.0, -1.0, 1.0) @ columns)
+    return np.array(found)
+
+
 def holds(flow: Flow, x: np.ndarray) -> None:
     p, G = flow.state_set(0)
     for d in np.random.default_rng(2).normal(size=(50, x.shape[1])):
@@ -84,6 +96,19 @@ def test_a_restart_holds_what_is_bent() -> None:
     following = restarted([flow], c.fields)
     assert following is not None
     holds(following, points(flow))
+
+
+@pytest.mark.parametrize("compact", [False, True])
+def test_a_second_restart_holds_what_it_has_no_columns_for(compiled: CompiledMode, compact: bool) -> None:
+    second = restarted([flow_of(compiled, compiled.whole(), 14)], compiled.fields)
+    assert second is not None
+    assert second.piece.variables == 4
+    for _ in range(14):
+        assert second.advance(10.0)
+    third = restarted([second], compiled.fields, compact=compact)
+    assert third is not None
+    assert third.piece.variables == (2 if compact else 4)
+    holds(third, extremes(second))
 
 
 def test_a_common_restart_holds_all_ends(compiled: CompiledMode) -> None:

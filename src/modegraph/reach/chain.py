@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 
 from .compiled import CompiledMode
 from .field import Field
-from .flow import RESTART_STEPS, Flow, Order
+from .flow import LATE_FEEDBACK, RESTART_STEPS, Flow, Order
 from .parallelotope import mode_gap
-from .restart import WIDE_GAP, restarted
+from .restart import WIDE_GAP, halved, restarted
 from .start import Piece
 
 EQUAL = 1e-6
@@ -20,7 +21,10 @@ EQUAL = 1e-6
 
 
 class Chain:
-    """Flows of one piece; each but the first continues from an enclosure of the end of the one before."""
+    """Flows of one piece; each but the first continues from an enclosure of the end of the one before.
+
+    Chains that are halves of another share its first flows.
+    """
 
     def __init__(
         self, compiled: CompiledMode, framed: Sequence[Field], piece: Piece, order: Order, deadline: float = math.inf
@@ -39,6 +43,8 @@ class Chain:
         self.failure = "" if first.failure is None else str(first.failure)
         """Why it stopped; empty while it has not."""
         self.begun = first.failure is None
+        self.shared = 0
+        """Number of flows that other chains have too."""
 
     def run(self, end: float, give_up: Callable[[Chain], bool] | None = None) -> bool:
         """Advance until ``end``, or until ``give_up``; False when the flowpipe failed before."""
@@ -79,15 +85,36 @@ class Chain:
         if not flow.steps and len(self.flows) > 1:
             self.flows.pop()
 
+    def weak(self) -> list[int]:
+        """Indices of its own flows, where cutting their starts helps most first.
+
+        What a remainder feeds to itself comes from how much the Jacobian varies over the set: the first flow
+        in which that is much is where the set has become too large for all that follow.
+        """
+        fed = self.fed()
+        return fed + [k for k in reversed(range(self.shared, len(self.flows))) if k not in fed]
+
+    def fed(self) -> list[int]:
+        """Indices of its own flows whose remainders fed themselves much at the end."""
+        return [k for k in range(self.shared, len(self.flows)) if self.flows[k].feedback >= LATE_FEEDBACK]
+
+    def halves(self, k: int) -> list[Chain]:
+        """Chains, not yet run, that share the flows before the restarted flow k and go on from its halves."""
+        whole, found = self.flows[k], []
+        if whole.piece.chart.free > len(whole.p0):
+            # In a parallelotope each axis carries all of the width: half of one of many columns is no half.
+            whole = restarted([self.flows[k - 1]], whole.fields, compact=True) or whole
+        for flow in halved(whole, nonlinear_variable(whole)):
+            chain = copy(self)
+            chain.flows, chain.shared, chain.failure = [*self.flows[:k], flow], k, ""
+            found.append(chain)
+        return found
+
     @property
     def time(self) -> float:
         """Instant until which everything is enclosed, seconds."""
         steps = self.flows[-1].steps
         return steps[-1].end if steps else 0.0
-
-    @property
-    def steps(self) -> int:
-        return sum(len(flow.steps) for flow in self.flows)
 
 
 def nonlinear_variable(flow: Flow) -> int:

@@ -75,7 +75,7 @@ class Flow:
     framed : the piece is given in the coordinates of the fields' frame.
     generation : how often the starts were enclosed again.
     longest_step : seconds; switching instants are ends of steps, so steps must not be too long.
-    t0, energy : seconds and a bound of int u'u at the start, for a flow that continues another.
+    t0, energy : seconds and a bound of int u'u at the start, kept as ``spent``, for a flow that continues another.
     lean : only boxes are kept of the remainders behind the last step.
     """
 
@@ -150,6 +150,7 @@ class Flow:
         self._ebox = np.zeros(n)
         self._ybox = np.zeros(n)
         self._energy = np.zeros(seen)
+        self.spent = energy
         self._energy_radius = energy
         self.feedback = 0.0
         self.next_restart = RESTART_STEPS

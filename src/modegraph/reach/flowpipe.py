@@ -33,6 +33,10 @@ MOST_PIECES = 32
 DEEPEST_CUT = 9
 MOST_LOOSE_PIECES, WORTH_CUTTING = 8, 0.8
 """A class of references that is very loose is cut into at most so many, while halves are by this much tighter."""
+MOST_TRIES = 3
+"""Places where a chain of flows is cut before it is given up."""
+MOST_TIGHTENED, NARROWER = 8, 0.9
+"""Complete chains are cut up to so many pieces, as long as the halves together end narrower by this in some state."""
 PROGRESS = 1.05
 """A cut or a higher degree must get this much further, or it is the last one."""
 PATIENT_DEPTH = 2
@@ -57,7 +61,7 @@ class Flowpipe:
     states : tuple[str, ...]
         Names of the coordinates of the boxes: states, then memory.
     pieces, steps : int
-        Parts the start set was cut into, and validated steps of all of them.
+        Parts the start set was cut into, at the start or on the way, and validated steps of all of them.
     """
 
     def __init__(
@@ -67,27 +71,31 @@ class Flowpipe:
         horizon: float,
         chains: Sequence[Chain],
         stuck: str,
-        one_of: Restrictor | None,
+        one_of: Restrictor | None = None,
     ) -> None:
         self.states = tuple(states)
         self._one_of = one_of
         self.horizon = horizon
         self.complete = not any(chain.failure for chain in chains)
         self._label = label
-        self._parts = [[Slicer(flow) for flow in chain.flows] for chain in chains]
+        flows = dict.fromkeys(flow for chain in chains for flow in chain.flows)
+        self._slicers = [Slicer(flow) for flow in flows]
         self._boxes: dict[tuple[float, float, bytes], Box] = {}
         begun = all(chain.begun for chain in chains)
         until = min(chain.time for chain in chains)
-        instants = np.unique(np.concatenate([slicer.times for part in self._parts for slicer in part]))
+        instants = np.unique(np.concatenate([slicer.times for slicer in self._slicers]))
         self.times: Floats = instants[instants <= until] if begun else np.zeros(0)
         self.pieces = len(chains)
-        self.steps = sum(chain.steps for chain in chains)
-        pieces = "1 piece" if self.pieces == 1 else f"{self.pieces} pieces"
+        self.steps = sum(len(flow.steps) for flow in flows)
+        starts = len({chain.flows[0] for chain in chains})
+        pieces = f"{starts} piece{'s' * (starts > 1)} of the start set"
+        if self.pieces > starts:
+            pieces += f", cut into {self.pieces} on the way"
         if self.complete:
-            self.reason = f"complete until t = {horizon:.6g} s ({pieces} of the start set, {self.steps} steps)"
+            self.reason = f"complete until t = {horizon:.6g} s ({pieces}, {self.steps} steps)"
         else:
             first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
-            self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces} of the start set{stuck})"
+            self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces}{stuck})"
 
     def at(self, t: float, r: ArrayLike | None = None) -> Box:
         """Box over states, then memory, around every state that is possible at time t (seconds).
@@ -125,7 +133,7 @@ class Flowpipe:
         p = None if r is None or self._one_of is None else self._one_of.parameters(r)
         key = a, b, b"" if p is None else p.tobytes()
         if key not in self._boxes:
-            slices = [s for part in self._parts for s in _slices(part, a, b)]
+            slices = _slices(self._slicers, a, b)
             if p is not None and self._one_of is not None:
                 slices = self._one_of.restricted(slices, p)
             self._boxes[key] = Box(*hull(slices))
@@ -152,15 +160,16 @@ class Flowpipe:
             )
         return value
 
-    def tubes(self) -> tuple[Floats, list[tuple[Floats, Floats]]]:
-        """For drawing: the grid (k,), and quick boxes (lo, hi) of each piece between instants, (k - 1, n)."""
+    def tubes(self) -> tuple[Floats, list[tuple[slice, Floats, Floats]]]:
+        """For drawing: the grid (k,), and of each flow its intervals and quick boxes (lo, hi) in these."""
         middles = 0.5 * (self.times[:-1] + self.times[1:])
         found = []
-        for part in self._parts:
-            ends = np.concatenate([slicer.times[1:] for slicer in part])
-            boxes = [slicer.steps() for slicer in part if len(slicer.times) > 1]
-            index = np.searchsorted(ends, middles)
-            found.append((np.vstack([b[0] for b in boxes])[index], np.vstack([b[1] for b in boxes])[index]))
+        for slicer in self._slicers:
+            first, last = np.searchsorted(middles, slicer.times[[0, -1]])
+            if first < last:
+                lo, hi = slicer.steps()
+                index = np.searchsorted(slicer.times[1:], middles[first:last])
+                found.append((slice(int(first), int(last)), lo[index], hi[index]))
         return self.times, found
 
     def plot(self, ax: Any = None, dims: int | str | Sequence[int | str] | None = None) -> Any:
@@ -199,13 +208,12 @@ class Flowpipe:
         return f"Flowpipe({self._label}, until={until}, complete={self.complete})"
 
 
-def _slices(part: Sequence[Slicer], a: float, b: float) -> list[Slice]:
-    """Slices of one piece in [a, b]."""
+def _slices(slicers: Sequence[Slicer], a: float, b: float) -> list[Slice]:
+    """Slices in [a, b]; at an instant where a flow continues another, of the other."""
     if a == b:
-        slicer = next(s for s in part if s.times[-1] >= a)
-        return [slicer.at(a)]
+        return [s.at(a) for s in slicers if s.times[0] < a <= s.times[-1] or a == s.times[0] == 0.0]
     found: list[Slice] = []
-    for slicer in part:
+    for slicer in slicers:
         begin, end = max(a, float(slicer.times[0])), min(b, float(slicer.times[-1]))
         if begin < end:
             found += slicer.over(begin, end)
@@ -290,24 +298,22 @@ class Cutting:
         stuck = ""
         while not stuck and any(part.chain.failure for part in parts):
             worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-            piece = worst.chain.piece
-            enough = time.monotonic() > self.deadline or len(parts) >= MOST_PIECES
-            if enough or piece.depth >= DEEPEST_CUT or piece.variables == 0:
-                stuck = "; no more are tried"
+            stuck = "; no more are tried"
+            if time.monotonic() > self.deadline or len(parts) >= MOST_PIECES:
                 break
-            children = self._halves(worst, ladder)
-            if not self._gained(worst.chain, [child.chain for child in children]):
+            for k in self._places(worst.chain):
+                children = self._cut(worst, k, ladder)
+                if self._gained(worst.chain, [child.chain for child in children], k):
+                    # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
+                    parts = [part for part in parts if part is not worst] + children
+                    stuck = ""
+                    break
                 stuck = "; cutting it gets no further"
-                break
-            # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
-            parts = [part for part in parts if part is not worst] + children
-        if self.compiled.parameters and not stuck and not self.disturbed:
+        if self.disturbed and not stuck:
+            parts = self._tightened(parts, ladder)
+        elif self.compiled.parameters and not stuck:
             parts = self._tighter(parts, ladder)
         return [part.chain for part in parts], stuck
-
-    def _halves(self, part: _Part, ladder: Sequence[Order]) -> list[_Part]:
-        halves = part.chain.piece.split(nonlinear_variable(part.chain.flows[0]))
-        return list(in_parallel([partial(self._best, half, ladder, part.rung, part.top) for half in halves]))
 
     def _tighter(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
         """Pieces of a class of references, the loosest cut as long as they are very loose and that helps."""
@@ -315,21 +321,54 @@ class Cutting:
             loosest = max(parts, key=lambda part: looseness(part.chain))
             if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
                 break
-            children = self._halves(loosest, ladder)
+            children = self._cut(loosest, 0, ladder)
             if max(looseness(child.chain) for child in children) > WORTH_CUTTING * looseness(loosest.chain):
                 break
             parts = [part for part in parts if part is not loosest] + children
         return parts
 
-    def _gained(self, whole: Chain, parts: Sequence[Chain]) -> bool:
+    def _gained(self, whole: Chain, parts: Sequence[Chain], place: int) -> bool:
         """Whether all parts get further than the whole did.
 
         At a kink one is enough, for a cut leaves a part astride of it.
         """
-        if whole.piece.depth < PATIENT_DEPTH:
+        if place == 0 and whole.piece.depth < PATIENT_DEPTH and len(whole.flows) == 1:
             return True
         further = [not part.failure or part.time > PROGRESS * whole.time for part in parts]
-        return any(further) if whole.flows[0].astride is not None else all(further)
+        return any(further) if whole.flows[place].astride is not None else all(further)
+
+    def _tightened(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
+        """Complete parts, the widest cut on the way as long as that makes its end much narrower."""
+        while len(parts) < MOST_TIGHTENED and time.monotonic() < self.deadline:
+            size = np.maximum(_end_widths(parts), 1e-300)
+            widest = max(parts, key=lambda part: float((_end_widths([part]) / size).sum()))
+            places = [k for k in self._places(widest.chain) if k > 0 and k in widest.chain.fed()]
+            if not places:
+                break
+            children = self._cut(widest, places[0], ladder)
+            if any(child.chain.failure for child in children):
+                break
+            if not (_end_widths(children) <= NARROWER * _end_widths([widest])).any():
+                break
+            parts = [part for part in parts if part is not widest] + children
+        return parts
+
+    def _places(self, chain: Chain) -> list[int]:
+        """Flows of a chain, the start of which may be cut, best first."""
+        pieces = [flow.piece for flow in chain.flows]
+        able = [k for k in chain.weak() if pieces[k].depth < DEEPEST_CUT and pieces[k].variables > 0]
+        return able[:MOST_TRIES]
+
+    def _cut(self, part: _Part, k: int, ladder: Sequence[Order]) -> list[_Part]:
+        """The halves of a part: of the start set, or of a set that flow k > 0 was started again from."""
+        if k == 0:
+            halves = part.chain.piece.split(nonlinear_variable(part.chain.flows[0]))
+            return list(in_parallel([partial(self._best, half, ladder, part.rung, part.top) for half in halves]))
+        return list(in_parallel([partial(self._go_on, part, chain) for chain in part.chain.halves(k)]))
+
+    def _go_on(self, part: _Part, chain: Chain) -> _Part:
+        chain.run(self.end)
+        return replace(part, chain=chain)
 
     def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
         """The chain of a piece with the first degree that is good enough, or the best one."""
@@ -358,6 +397,12 @@ class Cutting:
                 break
         assert best is not None
         return best
+
+
+def _end_widths(parts: Sequence[_Part]) -> Floats:
+    """Widths (n,) of the box around the ends of all parts."""
+    boxes = [part.chain.flows[-1].end_box() for part in parts]
+    return np.asarray(np.max([hi for _, hi in boxes], axis=0) - np.min([lo for lo, _ in boxes], axis=0))
 
 
 def _further(chain: Chain, other: Chain) -> bool:

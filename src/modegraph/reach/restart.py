@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ..enclosure.rounding import UNIT
 from .bounds import PolynomialBounds
 from .field import Field
 from .flow import Flow, Order
+from .framing import generator_box
 from .parallelotope import half_widths, principal_axes, tightest
 from .start import Piece
 
@@ -30,14 +32,14 @@ FULL, CHEAP, MOST_MONOMIALS = Order(4, 3), Order(3, 2), 500
 """Degrees after a restart, if that makes at most so many monomials, or else."""
 
 
-def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
+def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool = False) -> Flow | None:
     """A flow that continues ``flows`` from a zonotope around their ends; None if none is found.
 
-    One flow keeps the linear part of its polynomial; several are enclosed together, and start at the
-    latest of their instants: valid only where the loop does not depend on time. ``fields`` may be in
-    another frame than those of the flows.
+    One flow keeps the largest columns of its linear part, unless ``compact``: then one parallelotope holds
+    all. Several are enclosed so together, and start at the latest of their instants: valid only where the
+    loop does not depend on time. ``fields`` may be in another frame than those of the flows.
     """
-    piece = _around_one(flows[0], fields) if len(flows) == 1 else None
+    piece = None if compact or len(flows) > 1 else _around_one(flows[0], fields)
     if piece is None:
         piece = _around_all(flows, fields)
     if piece is None:
@@ -45,19 +47,41 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field]) -> Flow | None:
     first = flows[0]
     full = math.comb(piece.variables + FULL.degree, piece.variables)
     spent = [float(f.seen_bounds.upper(f.steps[-1].energy) + f.steps[-1].energy_radius) for f in flows]
+    return _like(
+        first,
+        piece,
+        fields=fields,
+        order=FULL if full <= MOST_MONOMIALS else CHEAP,
+        t0=max(flow.time for flow in flows),
+        energy=max(spent),
+        generation=first.generation + 1,
+    )
+
+
+def halved(flow: Flow, variable: int) -> list[Flow]:
+    """Flows that start where a restarted one does, from the halves of its piece: together they hold all of it."""
+    same: dict[str, Any] = {"fields": flow.fields, "order": flow.order, "generation": flow.generation}
+    begin = float(flow.times[0])
+    return [_like(flow, half, **same, t0=begin, energy=flow.spent) for half in flow.piece.split(variable)]
+
+
+def _like(
+    flow: Flow, piece: Piece, *, fields: Sequence[Field], order: Order, t0: float, energy: float, generation: int
+) -> Flow:
+    """A flow of the same loop and disturbance, from another piece in the coordinates of the states."""
     return Flow(
         fields,
         piece,
-        first.w_centre,
-        first.w_radius,
-        FULL if full <= MOST_MONOMIALS else CHEAP,
-        names=first.names,
-        stops=first.stops,
-        t0=max(flow.time for flow in flows),
-        energy=max(spent),
-        longest_step=first.longest_step,
-        generation=first.generation + 1,
-        lean=first.lean,
+        flow.w_centre,
+        flow.w_radius,
+        order,
+        names=flow.names,
+        stops=flow.stops,
+        t0=t0,
+        energy=energy,
+        longest_step=flow.longest_step,
+        generation=generation,
+        lean=flow.lean,
     )
 
 
@@ -67,36 +91,33 @@ def _candidates(fields: Sequence[Field], bounds: PolynomialBounds, p: Floats, G:
 
 
 def _around_one(flow: Flow, fields: Sequence[Field]) -> Piece | None:
-    """The linear part of p as it is, in the unknowns and once also in xi, and a parallelotope around all the rest."""
+    """The linear part of p as it is in the unknowns and its n largest columns, a parallelotope around the rest."""
     p, G = flow.state_set(len(flow.steps))
     n, free = len(p), flow.piece.chart.free
-    keep = 0 < free <= n
-    if not keep and not len(flow.piece.uncertain):
+    if free == 0 and not len(flow.piece.uncertain):
         return None
     linear = flow.bounds.linear_part(p)
-    centre, body = p[:, 0].copy(), np.zeros_like(p)
-    if keep:
-        below, above = flow.bounds.nonlinear_radius(p)
-        middle = 0.5 * (below + above)
-        centre = centre + middle
-        rest = 0.5 * (above - below) * (1.0 + 1e-12) + 8.0 * UNIT * (np.abs(centre) + np.abs(middle))
-        box = np.zeros((n, n, G.shape[2]))
-        box[np.arange(n), np.arange(n), 0] = rest
-        G = np.concatenate([G, box])
-    else:
-        body = p.copy()
-        body[:, 0] = 0.0
-        body[:, flow.table.linear[free:]] = 0.0
-    origin = np.zeros(n)
-    found = tightest([(flow.bounds, body, G)], _candidates(fields, flow.bounds, body, G), origin)
+    size = np.abs(linear).sum(axis=1) + generator_box(G)
+    length = np.linalg.norm(linear[:, :free] / np.maximum(size, 1e-300)[:, None], axis=0)
+    kept, small = np.split(np.argsort(-length, kind="stable"), [n])
+    below, above = flow.bounds.nonlinear_radius(p)
+    middle = 0.5 * (below + above)
+    centre = p[:, 0] + middle
+    rest = 0.5 * (above - below) * (1.0 + 1e-12) + 8.0 * UNIT * (np.abs(centre) + np.abs(middle))
+    added = np.zeros((n + len(small), n, G.shape[2]))
+    added[np.arange(n), np.arange(n), 0] = rest
+    added[n:, :, 0] = linear[:, small].T
+    every = np.concatenate([G, added])
+    nothing, origin = np.zeros_like(p), np.zeros(n)
+    found = tightest([(flow.bounds, nothing, every)], _candidates(fields, flow.bounds, nothing, every), origin)
     if found is None:
         return None
     M = found[0] * (found[1] * (1.0 + 1e-9))
     # The products are rounded entry by entry: what counts is that this very M holds the rest.
-    if not (half_widths(flow.bounds, body, G, M, origin) <= 1.0).all():
+    if not (half_widths(flow.bounds, nothing, every, M, origin) <= 1.0).all():
         return None
     old = flow.piece.chart
-    chart = old.around(centre, np.hstack([linear[:, :free], M]) if keep else M, original=False)
+    chart = old.around(centre, np.hstack([linear[:, np.sort(kept)], M]), original=False)
     lo, hi = old.unknown_lo.copy(), old.unknown_hi.copy()
     for i in flow.piece.uncertain.tolist():
         # The same variable: an unknown on the scale of its range in this piece.

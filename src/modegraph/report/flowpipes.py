@@ -23,8 +23,10 @@ def plot_flowpipe(pipe: Flowpipe, ax: Any = None, dims: tuple[int, ...] | None =
         _, ax = plt.subplots(figsize=(6.4, 4.8), constrained_layout=True)
     if dims is not None and len(dims) == 2:
         return _phase_plane(pipe, ax, parts, dims)
-    lo = np.min([below for below, _ in parts], axis=0)
-    hi = np.max([above for _, above in parts], axis=0)
+    lo = np.full((len(times) - 1, len(pipe.states)), np.inf)
+    hi = -lo
+    for rows, below, above in parts:
+        lo[rows], hi[rows] = np.minimum(lo[rows], below), np.maximum(hi[rows], above)
     for k in range(len(pipe.states)) if dims is None else dims:
         ax.stairs(hi[:, k], times, baseline=lo[:, k], fill=True, alpha=0.6, color=f"C{k % 10}", label=pipe.states[k])
     ax.set_xlabel("time")
@@ -42,7 +44,7 @@ def _phase_plane(pipe: Flowpipe, ax: Any, parts: list[Any], dims: tuple[int, ...
     a, b = dims
     boxes = [
         Rectangle((float(lo[a]), float(lo[b])), float(hi[a] - lo[a]), float(hi[b] - lo[b]))
-        for below, above in parts
+        for _, below, above in parts
         for lo, hi in zip(below, above, strict=True)
     ]
     ax.add_collection(PatchCollection(boxes, facecolor="C0", edgecolor="C0", alpha=0.35, linewidth=0.4))
