@@ -226,7 +226,8 @@ def flowpipe(
     """Enclose all trajectories of a mode, for every start, unknown constant and disturbance.
 
     Constraints are not looked at. Where the enclosure breaks down, a higher degree is tried, then the
-    start set is cut; what cannot be carried to the horizon is kept as far as it goes.
+    start set is cut, or under a disturbance what it has become on the way; what cannot be carried to the
+    horizon is kept as far as it goes.
 
     Parameters
     ----------
@@ -280,7 +281,7 @@ class _Part:
 
 
 class Cutting:
-    """Pieces of the start set, cut where the flowpipe ends first, as long as that gets further."""
+    """Pieces of the start set, or of later sets, cut where the flowpipe ends first, as long as that gets further."""
 
     def __init__(self, compiled: CompiledMode, end: float, deadline: float = math.inf) -> None:
         self.compiled, self.end, self.deadline = compiled, end, deadline
