@@ -1,0 +1,62 @@
+"""Relations out of one mode: budget, parts, resting centres, checks."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+import modegraph as mg
+from modegraph.certify.class_unit import relate
+from modegraph.certify.relation import Relation
+from modegraph.certify.unit import TargetSpec
+from tests.certify.class_graphs import double_integrators, one_integrator
+
+SQUARE = mg.Box([-1.0, -1.0], [1.0, 1.0])
+
+
+def related(mode: mg.Mode, targets: list[Any], seconds: float = 60.0) -> Any:
+    specs = [TargetSpec(t.name, None, t) for t in targets]
+    deadline = time.monotonic() + seconds
+    return relate(mode, None, specs, horizon=6.0, deadline=deadline, progress=lambda text: None)
+
+
+def test_what_cannot_be_a_target_is_told_and_the_rest_is_related() -> None:
+    mode = one_integrator(lambda r: r, lambda r: mg.Ball(r, 0.1), SQUARE, "mode")
+    level = mg.Target("level", mg.Sublevel(lambda x: x[0] ** 4 + x[1] ** 2, 1.0))
+    found = related(mode, [level, mode])
+    assert "'level'" in found.relations[0]
+    assert isinstance(found.relations[1], Relation)
+    assert found.check.status is mg.Status.CERTIFIED
+
+
+def test_a_centre_that_does_not_rest_refutes_nothing() -> None:
+    """The loop goes to r + (1, 0), its starts are around r."""
+    mode = one_integrator(lambda r: r + np.array([1.0, 0.0]), lambda r: mg.Ball(r, 0.1), SQUARE, "mode")
+    relation = related(mode, [mode]).relations[0]
+    assert relation.rest is None
+    source, target = np.array([[-0.5, 0.0]] * 2), np.array([[0.5, 0.0], [-0.5, 0.9]])
+    assert relation.crossings(source, target).certified.tolist() == [True, False]
+    assert not relation.refuted(source, target).any()
+
+
+def test_a_disturbance_that_cannot_be_zero_leaves_nothing_at_rest() -> None:
+    plant = mg.System(lambda x, u, w: u + w, states="a b", inputs="ua ub", disturbance=mg.Box([0.1, 0.0], [0.2, 0.0]))
+    mode = mg.Mode(
+        "pushed", plant, controller=lambda x, r: -4.0 * (x - r), reference=mg.setpoint(SQUARE),
+        start=lambda r: mg.Ball(r, 0.2),
+    )  # fmt: skip
+    relation = related(mode, [mode]).relations[0]
+    assert relation.rest is None
+    assert relation.crossings(np.zeros((1, 2)), np.array([[0.1, 0.0]])).certified[0]
+
+
+def test_the_deadline_is_kept_and_what_is_there_is_used() -> None:
+    mode = double_integrators(2)[0]
+    found = related(mode, [mode], seconds=-1.0)
+    relation = found.relations[0]
+    assert isinstance(relation, Relation)
+    assert not relation.crossings(np.zeros((1, 2)), np.full((1, 2), 0.4)).certified[0]
+    assert found.check.until == pytest.approx(0.0, abs=0.5) or found.check.status is mg.Status.CERTIFIED
