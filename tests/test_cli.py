@@ -239,7 +239,7 @@ def test_a_file_that_is_no_python(tmp_path: Path, engine: Any) -> None:
         (["--task", "odd"], "unknown entry 'target'"),
         (["--from", "slow", "--to", "fast", "--minimize", "money"], "minimize='money'"),
         (["--from", "slow", "--to", "fast", "--minimize", "time=x"], "is not a weight"),
-        (["--from", "slow", "--to", "fast", "--minimize", "distance"], "not built yet"),
+        (["--from", "slow", "--to", "fast", "--minimize", "length"], "is unknown; use"),
         (["--from", "slow", "--to", "fast", "--r-goal", "a,b"], "not a list of numbers"),
         (["--from", "slow", "--to", "fast", "--r-goal", "3"], "names no reference"),
         (["--from", "slow", "--to", "fast", "--start", "1,2"], "shape (1,)"),

@@ -13,14 +13,12 @@ from ..enclosure.observe import observe_step
 from ..enclosure.rounding import UNIT
 from ..enclosure.step import (
     DONE,
-    JACOBIAN_UNDEFINED,
     NO_CONTRACTION,
-    NO_GROWTH_BOUND,
-    UNDEFINED,
     flow_step,
 )
 from ..expression.tape import Tape
 from .bounds import PolynomialBounds
+from .breakdown import breakdown
 from .class_chart import start_polynomials
 from .error_table import error_table
 from .field import Field
@@ -418,22 +416,7 @@ class Flow:
         if self.frame is not None:
             widths = np.abs(self.frame.V) @ widths
         worst = self.names[int(np.argmax(widths))] if len(widths) else ""
-        if status == UNDEFINED:
-            what = f"a function leaves its domain: {fld.rates.labels[node]}"
-            help_ = "keep the starts away from there, or shrink the start set"
-        elif status == JACOBIAN_UNDEFINED:
-            what = (
-                "a function of the loop is not defined, or not continuous, on the whole set: "
-                f"{fld.jacobian.labels[node]}"
-            )
-            help_ = "keep the starts away from there, or shrink the start set"
-        elif status == NO_GROWTH_BOUND:
-            what = f"the error bound cannot be closed (state '{worst}' is the widest): the set has grown too far"
-            help_ = "shrink or split the start set, or shorten the horizon"
-        else:
-            what = f"the remainder does not contract (state '{worst}' is the widest)"
-            help_ = "shrink or split the start set, or shorten the horizon"
-        self.failure = Failure(self.time, what, help_)
+        self.failure = breakdown(self.time, status, node, fld, worst)
 
     def run(self, limit: float) -> bool:
         """Advance until ``limit``; False when the flowpipe failed before."""
