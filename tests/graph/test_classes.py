@@ -96,6 +96,9 @@ def test_verdicts_are_existential_over_what_is_not_named(line: mg.ModeGraph) -> 
     assert line.verdict("wide", "narrow", r_i=[0.2]).status is mg.Status.CERTIFIED
     assert line.verdict("wide", "home", r_i=[0.0]).status is mg.Status.REFUTED
     assert line.verdict("wide", "home").status is mg.Status.CERTIFIED
+    # The figures of a switch hold for every certified pair, those of a verdict for the one it names.
+    switch = next(s for s in line.switches if (s.source, s.target) == ("wide", "narrow"))
+    assert switch.margin == 0.0
     pair = line.verdict("wide", "narrow", [0.2], [0.25])
     assert pair.status is mg.Status.CERTIFIED
     assert pair.time is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
 from types import MappingProxyType
@@ -385,7 +385,9 @@ class ModeGraph:
             return None
         if self._classes.involves(i, j):
             some = self._class_verdict(i, j, None, None)
-            return _switch_of(i, j, self.references(i, j), some) if some.status is Status.CERTIFIED else None
+            # The figures of a switch hold for every pair: at the boundary of R^ij no margin is left.
+            known = replace(some, margin=0.0)
+            return _switch_of(i, j, self.references(i, j), known) if some.status is Status.CERTIFIED else None
         pairs: dict[tuple[int, int], Verdict] = {}
         undecided = 0
         for a in self.indices(i):
