@@ -196,3 +196,65 @@ def test_instants_before_a_limit_fails_may_be_used() -> None:
     assert verdict.time[1] <= 4.0
     assert all(slack >= 0.0 for slack in verdict.slack.values())
     assert graph.verdict("early", "early", [0.0], [0.4999]).status is mg.Status.UNDECIDED
+
+
+def scalar(controller: Any, region: mg.Box, radius: float, disturbance: mg.Box | None = None) -> mg.Mode:
+    """x' = u + w around r."""
+    if disturbance is None:
+        plant = mg.System(lambda x, u: u, states="x", inputs="u")
+    else:
+        push = lambda x, u, w: u + np.minimum(2e17 * w, 1.0)
+        plant = mg.System(push, states="x", inputs="u", disturbance=disturbance)
+    around = lambda r: mg.Box(r - radius, r + radius)
+    return mg.Mode("loop", plant, controller=controller, reference=mg.setpoint(region), start=around)
+
+
+@pytest.mark.parametrize(("low", "answer"), [(0.0, mg.Status.REFUTED), (1e-17, mg.Status.CERTIFIED)])
+def test_a_start_rests_only_where_the_disturbance_can_be_exactly_zero(low: float, answer: mg.Status) -> None:
+    """With w >= 1e-17 the rate is 1 for every w: all starts are in the target after a second."""
+    region = mg.Box([-0.1], [0.1])
+    mode = scalar(lambda x, r: 0.0 * x, region, 0.1, mg.Box([low], [1.0]))
+    verdict = mg.build([mode, mg.Target("goal", mg.Box([0.5], [1.5]))], horizon=3.0).verdict("loop", "goal", [0.0])
+    assert verdict.status in (answer, mg.Status.UNDECIDED)
+    assert (verdict.status is mg.Status.REFUTED) == (low == 0.0)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        lambda x, r: (r - x) * np.sqrt(r) ** 2,
+        lambda x, r: (r - x) * (r - 0.3) / (r - 0.3),
+        lambda x, r: (r - x) * (x - 0.3) / (x - 0.3),
+    ],
+    ids=["a root", "a pole in r", "a pole in x"],
+)
+def test_nothing_is_said_where_the_loop_is_not_defined(controller: Any) -> None:
+    mode = scalar(controller, mg.Box([-0.5], [1.0]), 0.1)
+    graph = mg.build([mode, mg.Target("goal", mg.Box([2.0], [2.5]))], horizon=2.0)
+    assert graph.verdict("loop", "goal", [0.3]).status is mg.Status.UNDECIDED
+    relaxed = scalar(lambda x, r: (r - x) * (r + 1.0) / (r + 1.0), mg.Box([-0.5], [1.0]), 0.1)
+    graph = mg.build([relaxed, mg.Target("goal", mg.Box([2.0], [2.5]))], horizon=2.0)
+    assert graph.verdict("loop", "goal", [0.3]).status is mg.Status.REFUTED
+
+
+def test_a_reference_and_itself_are_no_pair(line: mg.ModeGraph) -> None:
+    with pytest.raises(mg.ModegraphError, match="itself"):
+        line.verdict("wide", "wide", [0.0], [-0.0])
+    refs = relation(line, "wide", "wide")
+    assert refs.cells
+    assert all(refs.contains(cell.source.center, cell.target.center) for cell in refs.cells[:20])
+    for cell in refs.cells:
+        assert (cell.source.hi < cell.target.lo).any() or (cell.target.hi < cell.source.lo).any()
+
+
+def test_every_pair_of_a_cell_is_certified(line: mg.ModeGraph) -> None:
+    refs = relation(line, "wide", "narrow")
+    for cell in refs.cells[:50]:
+        corners = [(a, b) for a in (cell.source.lo, cell.source.hi) for b in (cell.target.lo, cell.target.hi)]
+        assert all(refs.contains(a, b) for a, b in corners)
+        assert max(abs(float(a[0] - b[0])) for a, b in corners) <= 0.1
+
+
+def test_statuses_want_arrays_of_the_right_shape(line: mg.ModeGraph) -> None:
+    with pytest.raises(mg.ModegraphError, match="statuses: give references"):
+        relation(line, "wide", "narrow").statuses(np.zeros((3, 2)), np.zeros((3, 1)))

@@ -369,4 +369,18 @@ ENGINE_FAULTS = (
         "        return [s.at(a) for s in slicers if s.times[0] < a <= s.times[-1] or a == s.times[0] == 0.0][:1]\n",
         ("tests/reach/test_chain.py::test_runs_under_switched_disturbances_stay_inside",),
     ),
+    Fault(
+        "a centre rests where the loop is not known to be defined",
+        "certify/class_unit.py",
+        "rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None",
+        "rest = _resting(mode, p, compiled)",
+        ("tests/graph/test_classes.py::test_nothing_is_said_where_the_loop_is_not_defined",),
+    ),
+    Fault(
+        "start sets of a class are as large as at its corners",
+        "reach/class_chart.py",
+        "rounded = ROUNDED * np.maximum(np.abs(low), np.abs(high))[:, 0]",
+        "rounded = 1e-3 * ROUNDED * np.maximum(np.abs(low), np.abs(high))[:, 0]",
+        ("tests/reach/test_class_chart.py::test_numbers_that_are_largest_inside_the_class_count",),
+    ),
 )

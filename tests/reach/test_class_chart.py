@@ -103,3 +103,14 @@ def test_another_shape_of_ellipsoid_is_another_set() -> None:
     for other in (mg.Ellipsoid(p, np.eye(2)), mg.Ball(p, 0.1)):
         with pytest.raises(mg.ModegraphError, match="not that of the formula"):
             require_same_start(start, chart, other, p, "mode 'hover'")
+
+
+def test_numbers_that_are_largest_inside_the_class_count() -> None:
+    plant = mg.System(lambda x, u: u, states="x", inputs="u")
+    wave = lambda r: 1000.0 * np.sin(2.0 * np.pi * r)
+    mode = mg.Mode(
+        "wave", plant, controller=lambda x, r: wave(r) - x, reference=mg.setpoint(mg.Box([0.0], [1.0])),
+        start=lambda r: mg.Box(wave(r) - 1e-3, wave(r) + 1e-3),
+    )  # fmt: skip
+    box = mg.flowpipe(mode, horizon=1.0).at(1.0, [0.25])
+    assert box.contains([1000.0])

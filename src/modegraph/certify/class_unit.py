@@ -66,6 +66,7 @@ def relate(
     end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
     chains = _legal_chains(compiled, end, deadline, progress)
     parameters = len(compiled.parameters)
+    rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None
     relations: list[Relation | str] = []
     for spec in targets:
         try:
@@ -74,7 +75,7 @@ def relate(
             relations.append(str(error))
             continue
         parts = [_part(chain, goal, end, parameters) for chain in chains]
-        relations.append(whole_relation(parameters, goal, parts, _resting(mode, p, compiled)))
+        relations.append(whole_relation(parameters, goal, parts, rest))
     slack = least_slack(slack_until(flow, k) for chain in chains for flow, k in _proved(chain))
     return ClassResult(relations, _check(compiled, chains), slack, end)
 
@@ -130,10 +131,15 @@ def _legal_chains(
 
 
 def _resting(mode: Mode, p: Floats | None, compiled: CompiledMode) -> TargetClass | None:
-    """The centres of the start sets, where each is an equilibrium of the undisturbed loop, for all unknowns."""
+    """The centres of the start sets, where each is an equilibrium of the undisturbed loop, for all unknowns.
+
+    The loop must be known to be defined on the start sets (a validated step shows that): what is cancelled
+    here is not asked for its domain.
+    """
     loop = compiled.loop
     segment = loop.segments[-1]
-    inside = not len(compiled.w_centre) or bool((np.abs(compiled.w_centre) <= compiled.w_radius).all())
+    pushes = mode.system.disturbance
+    inside = pushes is None or pushes.contains(np.zeros(pushes.dim))
     if len(loop.segments) != 1 or loop.reset or not inside:
         return None
     graph = loop.graph

@@ -94,8 +94,17 @@ class ContinuousReferences:
     # -- many pairs ------------------------------------------------------------------------------
 
     def statuses(self, r_i: Any, r_j: Any) -> NDArray[np.int64]:
-        """1 certified, -1 refuted, 0 undecided, for pairs (B, k_i), (B, k_j) of continuous classes."""
+        """1 certified, -1 refuted, 0 undecided, for pairs (B, k_i), (B, k_j) of continuous classes.
+
+        Of a finite class the first member counts; give it no column.
+        """
         source, target = np.atleast_2d(np.asarray(r_i, float)), np.atleast_2d(np.asarray(r_j, float))
+        wanted = [side.dim if isinstance(side, Box) else 0 for side in (self._source, self._target)]
+        if [source.shape[1], target.shape[1]] != wanted or len(source) != len(target):
+            raise ModegraphError(
+                f"statuses: give references (B, {wanted[0]}) of the source and (B, {wanted[1]}) of the target, "
+                f"not {source.shape} and {target.shape}"
+            )
         relation = self._relations.get((0, 0))
         if relation is None:
             return np.zeros(len(source), np.int64)
@@ -248,6 +257,9 @@ class ContinuousReferences:
             for lo, hi in sorted(boxes, key=lambda cell: -float(np.prod(cell[1] - cell[0]))):
                 source = Box(lo[:k], hi[:k]) if isinstance(self._source, Box) else (self._source[key[0]],)
                 target = Box(lo[k:], hi[k:]) if isinstance(self._target, Box) else (self._target[key[1]],)
+                if self._same and (np.maximum(lo[:k], lo[k:]) <= np.minimum(hi[:k], hi[k:])).all():
+                    # The pair of a reference with itself is no switch.
+                    continue
                 found.append(ProductCell(source, target))
         return tuple(found)
 

@@ -61,7 +61,8 @@ class Classes:
 
     def position(self, name: str, p: Floats) -> int:
         """Position of a reference among those named of its class; it is remembered."""
-        key = name, p.tobytes()
+        # -0.0 and 0.0 are one number.
+        key = name, (p + 0.0).tobytes()
         if key not in self._position:
             self._position[key] = len(self.named[name])
             self.named[name].append(p)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ..enclosure.intervals import IntervalEvaluator
 from ..enclosure.monomials import Monomials
 from ..enclosure.rounding import UNIT
 from ..errors import ModegraphError
@@ -31,7 +30,6 @@ def class_chart(start: StartClass, unknown_lo: Floats, unknown_hi: Floats) -> Ch
     tape, columns = _form(start)
     middle = np.asarray(start.region.center, float)
     m = len(columns)
-    corners = list(itertools.product(*zip(start.region.lo, start.region.hi, strict=True)))
     evaluate = Evaluator(tape)
 
     def numbers_at(p: Floats) -> tuple[Floats, Floats]:
@@ -42,8 +40,11 @@ def class_chart(start: StartClass, unknown_lo: Floats, unknown_hi: Floats) -> Ch
         return values[:, 0], values[:, 1:] - values[:, :1]
 
     centre, axes = numbers_at(middle)
-    sizes = [np.abs(c) + np.abs(L).sum(axis=1) for c, L in map(numbers_at, map(np.array, [middle, *corners]))]
-    rounded = ROUNDED * np.nan_to_num(np.max(sizes, axis=0), nan=0.0, posinf=0.0)
+    # The numbers may be larger inside the class than at its corners.
+    below = np.concatenate([-np.ones(m), start.region.lo])[:, None]
+    above = np.concatenate([np.ones(m), start.region.hi])[:, None]
+    low, high, _ = IntervalEvaluator(tape)(below, above)
+    rounded = ROUNDED * np.maximum(np.abs(low), np.abs(high))[:, 0]
     return Chart(
         centre, axes, start.set.round, None, unknown_lo, unknown_hi,
         parameters=len(middle), form=tape, rounded=rounded,
@@ -100,8 +101,6 @@ def require_same_start(start: StartClass, chart: Chart, instance: Set, p: Floats
     ModegraphError
         If rounding makes it another set; begins with ``owner``.
     """
-    from ..enclosure.intervals import IntervalEvaluator
-
     traced = start.set
     n = traced.dim
     exprs = [[c, *row] for c, row in zip(traced.centre, traced.axes, strict=True)]

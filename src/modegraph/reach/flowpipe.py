@@ -323,7 +323,8 @@ class Cutting:
             if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
                 break
             children = self._cut(loosest, 0, ladder)
-            if max(looseness(child.chain) for child in children) > WORTH_CUTTING * looseness(loosest.chain):
+            worst = max((looseness(child.chain) for child in children), default=0.0)
+            if worst > WORTH_CUTTING * looseness(loosest.chain):
                 break
             parts = [part for part in parts if part is not loosest] + children
         return parts
