@@ -258,3 +258,9 @@ def test_every_pair_of_a_cell_is_certified(line: mg.ModeGraph) -> None:
 def test_statuses_want_arrays_of_the_right_shape(line: mg.ModeGraph) -> None:
     with pytest.raises(mg.ModegraphError, match="statuses: give references"):
         relation(line, "wide", "narrow").statuses(np.zeros((3, 2)), np.zeros((3, 1)))
+
+
+def test_nothing_is_said_of_references_outside_the_classes(line: mg.ModeGraph) -> None:
+    refs = relation(line, "wide", "narrow")
+    assert refs.statuses([[1.0]], [[1.0]])[0] == 1
+    assert refs.statuses([[1.0], [1.01], [0.0]], [[1.01], [1.0], [2.0]]).tolist() == [0, 0, 0]

@@ -22,7 +22,7 @@ from ..reach.ladder import CURVED
 from .crossing import proved_instants
 from .evidence import sampled_violation, slack_until, width_over_time
 from .moments import moments_of
-from .proof import SafetyProof, certified_check, least_slack, safe_together
+from .proof import SafetyProof, certified_check, least_slack
 from .relation import Part, Relation, whole_relation
 from .target_class import TargetClass, target_class
 from .unit import TargetSpec
@@ -185,9 +185,7 @@ def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
     widths = width_over_time(chains[0].flows[:1])
     if compiled.linear and not any(f.faces for f in compiled.fields) and until >= last.start:
         # A linear loop has a solution for all time, and there is nothing else to prove.
-        proof = safe_together([SafetyProof({}, until, np.full(last.outputs, np.inf))])
-        assert proof is not None
-        return replace(certified_check(proof), widths=widths)
+        return replace(certified_check(SafetyProof({}, until, np.full(last.outputs, np.inf))), widths=widths)
     reason = (
         f"constraints proved until t = {until:.4g} s for all references of the class; what comes later is not decided "
         "for a continuous class yet: check one reference of it with mg.Points([...])"

@@ -6,7 +6,7 @@ outside the target for ever, undecided between.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -96,7 +96,7 @@ class ContinuousReferences:
     def statuses(self, r_i: Any, r_j: Any) -> NDArray[np.int64]:
         """1 certified, -1 refuted, 0 undecided, for pairs (B, k_i), (B, k_j) of continuous classes.
 
-        Of a finite class the first member counts; give it no column.
+        Of a finite class the first member counts; give it no column. Outside the classes nothing is said: 0.
         """
         source, target = np.atleast_2d(np.asarray(r_i, float)), np.atleast_2d(np.asarray(r_j, float))
         wanted = [side.dim if isinstance(side, Box) else 0 for side in (self._source, self._target)]
@@ -108,8 +108,12 @@ class ContinuousReferences:
         relation = self._relations.get((0, 0))
         if relation is None:
             return np.zeros(len(source), np.int64)
+        known = np.ones(len(source), bool)
+        for side, p in ((self._source, source), (self._target, target)):
+            if isinstance(side, Box):
+                known &= ((p >= side.lo) & (p <= side.hi)).all(axis=1)
         certified = relation.crossings(source, target).certified & ~self._trivial(source, target)
-        return np.where(certified, 1, np.where(relation.refuted(source, target), -1, 0))
+        return np.where(known, np.where(certified, 1, np.where(relation.refuted(source, target), -1, 0)), 0)
 
     def sample(self, n: int, seed: int | None = None) -> list[tuple[Parameter, Parameter]]:
         """``n`` certified pairs, spread over R^ij by random walks inside it.
@@ -168,7 +172,10 @@ class ContinuousReferences:
         """Whether every pair is proved refuted, with a reference kept where it is given."""
         for key in self._relations:
             within = self._within(key, r_i, r_j)
-            if within is not None and not self._nothing_but_refuted(key, within):
+            if within is None:
+                continue
+            cells = self._certified_cells(key, within=within)
+            if cells.boxes or len(cells.lo):
                 return False
         return True
 
@@ -188,19 +195,6 @@ class ContinuousReferences:
             elif match_parameter(side, given) != index:
                 return None
         return lo, hi
-
-    def _nothing_but_refuted(self, key: tuple[int, int], within: tuple[Floats, Floats]) -> bool:
-        lo, hi = within[0][None], within[1][None]
-        examined = 0
-        while len(lo):
-            _, no = self._relations[key].cells(self._split(lo), self._split(hi))
-            examined += len(lo)
-            lo, hi = lo[~no], hi[~no]
-            if examined + 2 * len(lo) > MOST_CELLS:
-                return False
-            if len(lo):
-                lo, hi = self._halved(lo, hi)
-        return True
 
     def closest(
         self, key: tuple[int, int], rng: np.random.Generator, count: int = 8,
@@ -263,9 +257,12 @@ class ContinuousReferences:
                 found.append(ProductCell(source, target))
         return tuple(found)
 
-    def _certified_cells(self, key: tuple[int, int], most: int = MOST_CELLS) -> _Cells:
+    def _certified_cells(
+        self, key: tuple[int, int], most: int = MOST_CELLS, within: tuple[Floats, Floats] | None = None
+    ) -> _Cells:
+        """Cells of a box of joint parameters (lo, hi), by default of all; what is in none of them is refuted."""
         relation = self._relations[key]
-        lo, hi = (side[None] for side in self._bounds)
+        lo, hi = (side[None] for side in (self._bounds if within is None else within))
         found = _Cells([], 0.0, lo, hi)
         examined = 0
         while len(lo) and examined + len(lo) <= most:
@@ -338,10 +335,6 @@ class ContinuousReferences:
             lower += certified
             upper += possible
         return lower, upper
-
-    def pairs(self) -> Iterator[tuple[int, int]]:
-        """Members related: positions in the finite classes, 0 for a continuous one."""
-        return iter(self._relations)
 
     def __repr__(self) -> str:
         return f"ContinuousReferences({len(self._relations)} relations)"

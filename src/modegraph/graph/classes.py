@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,10 +148,7 @@ class Classes:
             proof = SwitchProof(0.0, times, 0.0, 0.0, energies, dict(link.slack), len(link.relation.parts))
             verdict = certified_switch(proof, link.horizon)
             reason = f"certified for a continuous set of references, among them {where}"
-            return Verdict(
-                verdict.status, reason, time=verdict.time, margin=1.0 - gauge, slack=verdict.slack,
-                horizon=verdict.horizon, energy=verdict.energy, window=verdict.window,
-            )  # fmt: skip
+            return replace(verdict, reason=reason, margin=1.0 - gauge)
         if not texts and refs.all_refuted(r_i, r_j):
             told = _resting(link.relation, left[None], right[None])
             reason = f"refuted for all references; closest {where}: {told.reason}"
