@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import ModegraphError
 from ..expression.scalar import Expr
 from ..expression.simplify import simplify
-from ..model.class_start import StartClass
+from ..model.class_start import StartClass, returned_start
 from ..model.mode import Mode
-from ..model.trajectory import at_instant
+from ..model.sets.parametrised import ParametrisedSet
 from ..reach.chain import Chain, nonlinear_variable
 from ..reach.compiled import CompiledMode, compile_mode
 from ..reach.flow import Flow, Order
@@ -164,16 +164,8 @@ def _resting(mode: Mode, p: Floats | None, compiled: CompiledMode) -> TargetClas
 
 def _centre_in(mode: Mode, compiled: CompiledMode) -> list[Expr]:
     """The centre of the start set as expressions of the closed loop's own graph."""
-    from ..expression.trace import call
-    from ..model.sets.parametrised import ParametrisedSet
-    from ..model.traced_reference import TracedReference
-
     loop = compiled.loop
-    assert not hasattr(mode.start, "contains")
-    first = mode.reference.pieces(loop.graph, loop.time, loop.parameters, mode.label)[0]
-    value, dot, ddot = (at_instant(part, loop.time, 0.0) for part in (first.value, first.dot, first.ddot))
-    reference = TracedReference.of(value, dot, ddot, loop.parameters)
-    returned = call(mode.start, {"r": reference}, role="start", owner=mode.label)
+    returned = returned_start(mode, loop.graph, loop.time, loop.parameters)
     assert isinstance(returned, ParametrisedSet)
     return returned.traced(loop.graph, mode.label).centre
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +74,7 @@ def class_start(mode: Mode) -> StartClass | Set:
     graph = Graph()
     parameters = graph.variables([f"p[{k}]" for k in range(region.dim)])
     time = graph.variable("t")
-    first = mode.reference.pieces(graph, time, parameters, owner)[0]
-    value, dot, ddot = (at_instant(part, time, 0.0) for part in (first.value, first.dot, first.ddot))
-    reference = TracedReference.of(value, dot, ddot, parameters)
-    returned = call(mode.start, {"r": reference}, role="start", owner=owner)
+    returned = returned_start(mode, graph, time, parameters)
     if not isinstance(returned, ParametrisedSet):
         return checked_start(mode, returned, owner)
     traced = returned.traced(graph, f"{owner}, start")
@@ -86,6 +84,15 @@ def class_start(mode: Mode) -> StartClass | Set:
     _require_existence(entries, dropped, traced.conditions, parameters, region, f"{owner}, start")
     middle = mode_start(mode, region.center)
     return StartClass(parameters, region, traced, np.asarray(middle.center, float))
+
+
+def returned_start(mode: Mode, graph: Graph, time: Expr, parameters: list[Expr]) -> Any:
+    """What the function ``start`` of a mode returns for the reference at t = 0, traced in these parameters."""
+    first = mode.reference.pieces(graph, time, parameters, mode.label)[0]
+    value, dot, ddot = (at_instant(part, time, 0.0) for part in (first.value, first.dot, first.ddot))
+    reference = TracedReference.of(value, dot, ddot, parameters)
+    assert callable(mode.start)
+    return call(mode.start, {"r": reference}, role="start", owner=mode.label)
 
 
 def _decided_exactly(condition: Condition, parameters: Sequence[Expr], region: Box, where: str) -> bool:
