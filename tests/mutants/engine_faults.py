@@ -6,20 +6,6 @@ from tests.mutants.fault import Fault
 
 ENGINE_FAULTS = (
     Fault(
-        "a relation is the union over the parts of the starts",
-        "certify/relation.py",
-        "gauge[here] = np.maximum(gauge[here], g.min(axis=1))",
-        "gauge[here] = np.minimum(gauge[here], g.min(axis=1))",
-        ("tests/certify/test_relation.py::test_no_certified_pair_lies_outside",),
-    ),
-    Fault(
-        "a relation looks at the middle of the starts only",
-        "certify/moments.py",
-        "gauge = (length + self._spread[:, 0])",
-        "gauge = (length + 0.0 * self._spread[:, 0])",
-        ("tests/graph/test_classes.py::test_every_certified_pair_holds_in_simulation",),
-    ),
-    Fault(
         "a relation uses instants behind a broken limit",
         "certify/moments.py",
         "usable = min(proved_instants(flow), ",

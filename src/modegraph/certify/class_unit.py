@@ -66,6 +66,7 @@ def relate(
     end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
     chains = _legal_chains(compiled, end, deadline, progress)
     parameters = len(compiled.parameters)
+    region = mode.reference.region if p is None else None
     rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None
     relations: list[Relation | str] = []
     for spec in targets:
@@ -75,7 +76,7 @@ def relate(
             relations.append(str(error))
             continue
         parts = [_part(chain, goal, end, parameters) for chain in chains]
-        relations.append(whole_relation(parameters, goal, parts, rest))
+        relations.append(whole_relation(region, goal, parts, rest))
     slack = least_slack(slack_until(flow, k) for chain in chains for flow, k in _proved(chain))
     return ClassResult(relations, _check(compiled, chains), slack, end)
 
@@ -104,9 +105,7 @@ def _proved_until(chain: Chain) -> float:
     return float(found[-1][0].times[found[-1][1]]) if found else -1.0
 
 
-def _legal_chains(
-    compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]
-) -> list[Chain]:
+def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]) -> list[Chain]:
     """Chains that cover all starts, cut where a constraint cannot be proved, as long as that helps."""
     cutting = Cutting(compiled, end, deadline)
     chains, _ = cutting.run()

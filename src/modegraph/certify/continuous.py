@@ -80,7 +80,7 @@ class ContinuousReferences:
         relation = self._relations.get((left[0], right[0]))
         if relation is None or self._trivial(left[1], right[1])[0]:
             return False
-        return bool(relation.crossings(left[1], right[1]).certified[0])
+        return bool(relation.certified(left[1], right[1])[0])
 
     def __contains__(self, pair: object) -> bool:
         return isinstance(pair, tuple | list) and len(pair) == 2 and self.contains(*pair)
@@ -112,7 +112,7 @@ class ContinuousReferences:
         for side, p in ((self._source, source), (self._target, target)):
             if isinstance(side, Box):
                 known &= ((p >= side.lo) & (p <= side.hi)).all(axis=1)
-        certified = relation.crossings(source, target).certified & ~self._trivial(source, target)
+        certified = relation.certified(source, target) & ~self._trivial(source, target)
         return np.where(known, np.where(certified, 1, np.where(relation.refuted(source, target), -1, 0)), 0)
 
     def sample(self, n: int, seed: int | None = None) -> list[tuple[Parameter, Parameter]]:
@@ -179,9 +179,7 @@ class ContinuousReferences:
                 return False
         return True
 
-    def _within(
-        self, key: tuple[int, int], r_i: Floats | None, r_j: Floats | None
-    ) -> tuple[Floats, Floats] | None:
+    def _within(self, key: tuple[int, int], r_i: Floats | None, r_j: Floats | None) -> tuple[Floats, Floats] | None:
         """Box of joint parameters with given references; None where they name other members."""
         lo, hi = (side.copy() for side in self._bounds)
         k = self._source.dim if isinstance(self._source, Box) else 0
@@ -341,19 +339,21 @@ class ContinuousReferences:
 
 
 def _find(side: Side, r: Any) -> tuple[int, Floats] | None:
-    """Position and parameters (1, k) of a reference of one side; None if it is not there."""
+    """Position and parameters (1, k) of a reference of one side; None if it is not there.
+
+    Whether a continuous class contains it is left to the relation.
+    """
     if not isinstance(side, Box):
         index = match_parameter(side, r)
         return None if index is None else (index, np.zeros((1, 0)))
     try:
-        p = np.atleast_1d(np.asarray(r, dtype=float))
+        p = np.asarray(r, dtype=float)
     except (TypeError, ValueError):
         return None
-    return (0, p[None]) if p.shape == (side.dim,) and side.contains(p) else None
+    return (0, p.reshape(1, -1)) if p.size == side.dim and p.ndim < 2 else None
 
 
 def _members(side: Side, values: Floats, index: int) -> Sequence[Parameter]:
     if isinstance(side, Box):
         return list(values)
     return [side[index]] * len(values)
-

@@ -18,7 +18,7 @@ from modegraph.model.target import Target
 from modegraph.plan.objectives import Cost, Objective
 
 if TYPE_CHECKING:
-    from modegraph.graph.modegraph import ModeGraph, Node
+    from modegraph.graph.modegraph import ModeGraph
     from modegraph.run.simulate import Run
 
 
@@ -68,22 +68,22 @@ class Plan:
     def of(
         cls,
         graph: ModeGraph,
-        nodes: Sequence[Node],
+        stops: Sequence[tuple[str, Parameter]],
         *,
         objective: Objective,
         cost: Cost,
         margin: float | None,
         x0: Any,
     ) -> Plan:
-        """The plan along ``nodes`` of ``graph``, whose consecutive pairs are all certified."""
-        switches = [graph.pair_switch(s, t) for s, t in pairwise(nodes)]
+        """The plan along ``stops``, a mode and a reference each, whose consecutive pairs are all certified."""
+        switches = [graph.pair_switch(i, j, p, q) for (i, p), (j, q) in pairwise(stops)]
         energies = [s.energy for s in switches]
         known = [Fraction(e) for e in energies if e is not None and math.isfinite(e)]
         energy = rounded_up(sum(known, Fraction(0))) if len(known) == len(energies) else None
-        goal_check = _goal_check(graph, nodes[-1])
+        goal_check = _goal_check(graph, *stops[-1])
         return cls(
-            modes=[name for name, _ in nodes],
-            references=[graph.parameter(node) for node in nodes],
+            modes=[name for name, _ in stops],
+            references=[p for _, p in stops],
             switches=switches,
             time=(
                 rounded_down(sum((Fraction(s.time[0]) for s in switches), Fraction(0))),
@@ -94,7 +94,7 @@ class Plan:
             margin=margin,
             objective=objective.name,
             goal_check=goal_check,
-            warnings=_warnings(nodes[-1][0], goal_check, objective, cost),
+            warnings=_warnings(stops[-1][0], goal_check, objective, cost),
             x0=x0,
             graph=graph,
         )
@@ -184,11 +184,8 @@ def _cost(objective: Objective, cost: Cost, margin: float | None, switches: int)
     return switches if objective.name == "switches" else rounded_up(cost[1])
 
 
-def _goal_check(graph: ModeGraph, node: Node) -> Verdict:
-    name, _ = node
-    if isinstance(graph.modes[name], Target):
-        return only_entered(name)
-    return graph.node_check(node)
+def _goal_check(graph: ModeGraph, name: str, p: Parameter) -> Verdict:
+    return only_entered(name) if isinstance(graph.modes[name], Target) else graph.goal_check(name, p)
 
 
 def _warnings(goal: str, check: Verdict, objective: Objective, cost: Cost) -> tuple[str, ...]:
