@@ -6,6 +6,20 @@ from tests.mutants.fault import Fault
 
 ENGINE_FAULTS = (
     Fault(
+        "the invariant set of a class stays where its middle is",
+        "reach/tail.py",
+        "            chart = replace(chart, tilt=self._tilt)\n",
+        "            pass\n",
+        ("tests/reach/test_tail.py",),
+    ),
+    Fault(
+        "the invariant set of a class moves the wrong way in a part of it",
+        "reach/tail.py",
+        "            p[:, 0] -= tilt * ((c - middle) / radius)\n",
+        "            p[:, 0] += tilt * ((c - middle) / radius)\n",
+        ("tests/reach/test_tail.py",),
+    ),
+    Fault(
         "a relation uses instants behind a broken limit",
         "certify/moments.py",
         "usable = min(proved_instants(flow), ",

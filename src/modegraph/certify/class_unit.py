@@ -19,8 +19,9 @@ from ..reach.compiled import CompiledMode, compile_mode
 from ..reach.flow import Flow, Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
 from ..reach.ladder import CURVED
+from ..reach.tail import Tail, TailFailure, TailSearch
 from .crossing import proved_instants
-from .evidence import sampled_violation, slack_until, width_over_time
+from .evidence import lasting, sampled_violation, slack_until, width_over_time
 from .moments import moments_of
 from .proof import SafetyProof, certified_check, least_slack
 from .relation import Part, Relation, whole_relation
@@ -170,17 +171,38 @@ def _centre_in(mode: Mode, compiled: CompiledMode) -> list[Expr]:
 
 
 def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
-    """Assumption 1 for the whole class: proved as far as the flows go; for ever where nothing is to be proved."""
+    """Assumption 1 for the whole class: as far as the flows go, and for ever where a tail closes the time axis."""
     until = min(map(_proved_until, chains))
     last = compiled.fields[-1]
     widths = width_over_time(chains[0].flows[:1])
     if compiled.linear and not any(f.faces for f in compiled.fields) and until >= last.start:
         # A linear loop has a solution for all time, and there is nothing else to prove.
         return replace(certified_check(SafetyProof({}, until, np.full(last.outputs, np.inf))), widths=widths)
-    reason = (
-        f"constraints proved until t = {until:.4g} s for all references of the class; what comes later is not decided "
-        "for a continuous class yet: check one reference of it with mg.Points([...])"
-        if until >= 0.0
-        else "the constraints are not proved at the start for all references of the class"
-    )
-    return Verdict(Status.UNDECIDED, reason, until=max(until, 0.0), widths=widths)
+    if until < 0.0:
+        reason = "the constraints are not proved at the start for all references of the class"
+        return Verdict(Status.UNDECIDED, reason, until=0.0, widths=widths)
+    tail = _tail(compiled, chains)
+    if isinstance(tail, Tail):
+        return replace(
+            certified_check(lasting([flow for chain in chains for flow in chain.flows], tail)), widths=widths
+        )
+    reason = f"constraints proved until t = {until:.4g} s for all references of the class, not for ever: {tail.reason}"
+    return Verdict(Status.UNDECIDED, reason, until=until, widths=widths)
+
+
+def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure:
+    """An invariant set from the ends of the flows on, its centre moving with the reference."""
+    for chain in chains:
+        flow = chain.flows[-1]
+        if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
+            return TailFailure("the flowpipe ends before the loop has settled")
+    flows = [chain.flows[-1] for chain in chains]
+    field = flows[0].fields[-1]
+    if any(flow.fields[-1] is not field for flow in flows):
+        return TailFailure("the parts of the starts end in different coordinates")
+    order = Order(1, 0) if compiled.linear else chains[0].order
+    search = TailSearch(field, compiled.whole().chart, compiled.w_centre, compiled.w_radius, compiled.loop.names, order)
+    found = search.attempt(flows)
+    if isinstance(found, Tail) and not (found.face_upper <= 0.0).all():
+        return TailFailure("a constraint cannot be proved on the invariant set")
+    return found
