@@ -70,6 +70,21 @@ class TargetClass:
         """c(p) = c0 + C p, (n,) and (n, k), where c is affine and the limits are fixed; None elsewhere."""
         return None if self._line is None else self._line[:2]
 
+    def over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats, Floats]:
+        """For planning: ranges (B, f) of rows c(p) over boxes (B, k) of references, and the largest limits."""
+        if self._line is not None:
+            c0, C, _, _, high = self._line
+            slopes = self.rows @ C
+            middle, radius = 0.5 * (lo + hi) @ slopes.T + self.rows @ c0, 0.5 * (hi - lo) @ np.abs(slopes).T
+            return middle - radius, middle + radius, np.tile(high, (len(lo), 1))
+        low, top, _ = self._tape(np.ascontiguousarray(lo.T), np.ascontiguousarray(hi.T))
+        centre, reach = (0.5 * side[: self.dim].T for side in (low + top, top - low))
+        sizes = np.tile(self._limits, (len(lo), 1)) if len(top) == self.dim else np.maximum(top[self.dim :].T, 0.0)
+        if len(top) > self.dim and not self.round:
+            sizes = np.concatenate([sizes, sizes], axis=1)
+        about, radius = centre @ self.rows.T, reach @ np.abs(self.rows).T
+        return about - radius, about + radius, sizes
+
     @property
     def middle(self) -> Floats:
         """The middle (1, k) of the class."""

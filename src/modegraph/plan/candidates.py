@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.target_class import target_class
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box
 from modegraph.plan.network import Network
+from modegraph.plan.question import End
 from modegraph.plan.routes import Route, Routes
 
 if TYPE_CHECKING:
@@ -36,28 +37,6 @@ FINER = (1.0, 1.5, 2.0, 3.0)
 """A walk is also tried in so many times the fewest steps, of equal length: short steps are quick."""
 MOST_WALKS = 12
 """Walks from one question that are followed."""
-
-
-@dataclass(frozen=True)
-class End:
-    """Where a plan begins or ends: a mode, and what is known of its reference.
-
-    Attributes
-    ----------
-    stop : Node
-        (mode, member of a finite class; 0 for a continuous one)
-    p : (k,) array or None
-        The reference, where the class is continuous and it is given.
-    within : Box or None
-        Where it may be.
-    """
-
-    stop: Node
-    p: Floats | None = None
-    within: Box | None = None
-
-    def allows(self, p: Floats) -> bool:
-        return (self.p is None or np.array_equal(self.p, p)) and (self.within is None or self.within.contains(p))
 
 
 class Proposals:
@@ -112,7 +91,7 @@ class Proposals:
         return True
 
     def _steps(self, name: str, a: Floats, b: Floats) -> int:
-        """How many certified steps lead from a to b, each as long as can be; 0: no way was found."""
+        """How many certified steps lead from a to b, as few as were found; 0: no way was found."""
         refs = self.graph.references(name, name)
         here = a
         for count in range(1, MOST_STEPS):
@@ -123,9 +102,19 @@ class Proposals:
             if not len(good):
                 return 0
             if good[0] == 0:
+                # Steps of equal length may be fewer.
+                while count > 1 and self._even(refs, a, b, count - 1):
+                    count -= 1
                 return count
             here = ahead[good[0]]
         return 0
+
+    @staticmethod
+    def _even(refs: ContinuousReferences, a: Floats, b: Floats, count: int) -> bool:
+        """Whether so many equal steps from a to b are all certified."""
+        line = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
+        line[-1] = b
+        return bool((refs.statuses(line[:-1], line[1:]) == 1).all())
 
     def image(self, name: str, place: Floats) -> Floats | None:
         """The reference of a class whose start set is centred nearest to a place (least squares, clipped)."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -63,6 +64,7 @@ class Plan:
     warnings: tuple[str, ...]
     x0: Any = None
     graph: ModeGraph = field(repr=False, kw_only=True)
+    bounded: Callable[[], float] = field(repr=False, kw_only=True)
 
     @classmethod
     def of(
@@ -74,6 +76,7 @@ class Plan:
         cost: Cost,
         margin: float | None,
         x0: Any,
+        bounded: Callable[[], float],
     ) -> Plan:
         """The plan along ``stops``, a mode and a reference each, whose consecutive pairs are all certified."""
         switches = [graph.pair_switch(i, j, p, q) for (i, p), (j, q) in pairwise(stops)]
@@ -97,7 +100,21 @@ class Plan:
             warnings=_warnings(stops[-1][0], goal_check, objective, cost),
             x0=x0,
             graph=graph,
+            bounded=bounded,
         )
+
+    @cached_property
+    def bound(self) -> float:
+        """No plan made of what is certified costs less, whatever references it chooses (a float computation).
+
+        Equal to ``cost`` where all classes are finite: their best plan is found exactly.
+        """
+        return min(self.cost, self.bounded()) if self.graph.regions else self.cost
+
+    @property
+    def gap(self) -> float:
+        """How much a better choice of references might still save: cost - bound."""
+        return self.cost - self.bound if math.isfinite(self.cost) else 0.0
 
     def simulate(self, x0: Any = None, plant: Any = None, force: bool = False, *, stay: float | None = None) -> Run:
         """Integrate the real closed loop with its switching logic; see ``modegraph.run.simulate``.
@@ -160,6 +177,8 @@ class Plan:
         lines.append(f"  in {self.modes[-1]!r} between {self.time[0]:.4g} and {self.time[1]:.4g} s, certified")
         if self.energy is not None:
             lines.append(f"  energy at most {self.energy:.4g}")
+        if self.graph.regions:
+            lines.append(f"  {self.objective}: {self.cost:.4g}; no choice of references gets below {self.bound:.4g}")
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 

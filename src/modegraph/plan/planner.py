@@ -14,10 +14,12 @@ from modegraph.graph.entry import may_enter, plain_state
 from modegraph.graph.modegraph import Node
 from modegraph.model.sets import Box
 from modegraph.model.target import Target
-from modegraph.plan.candidates import End, Proposals
+from modegraph.plan.bound import Relaxation
+from modegraph.plan.candidates import Proposals
 from modegraph.plan.network import Network
-from modegraph.plan.objectives import Objective, objective
+from modegraph.plan.objectives import objective
 from modegraph.plan.plan import Plan
+from modegraph.plan.question import End, Question
 from modegraph.plan.search import Path, Problem, best_paths
 from modegraph.plan.unreachable import unreachable
 
@@ -80,7 +82,7 @@ def plans(
         return problem, best_paths(problem, k)
 
     if graph.regions:
-        proposals = _proposals(graph)
+        proposals, _ = _kept(graph)
         placed = [_placed(proposals, end, state) for end in starts]
         for end in [*placed, *goals]:
             if end.p is not None:
@@ -92,16 +94,17 @@ def plans(
         problem, paths = found()
     if not paths:
         raise unreachable(graph, problem, None if start is None else graph.name_of(start), graph.name_of(goal))
-    return [_plan(network, path, wanted, state) for path in paths]
+    question = Question(starts, goals, state, avoided, wanted)
+    return [_plan(network, path, question) for path in paths]
 
 
-_KEPT: WeakKeyDictionary[ModeGraph, Proposals] = WeakKeyDictionary()
+_KEPT: WeakKeyDictionary[ModeGraph, tuple[Proposals, Relaxation]] = WeakKeyDictionary()
 
 
-def _proposals(graph: ModeGraph) -> Proposals:
+def _kept(graph: ModeGraph) -> tuple[Proposals, Relaxation]:
     """What was learnt of a graph in earlier questions."""
     if graph not in _KEPT:
-        _KEPT[graph] = Proposals(graph)
+        _KEPT[graph] = Proposals(graph), Relaxation(graph)
     return _KEPT[graph]
 
 
@@ -181,13 +184,14 @@ def _may_enter(network: Network, node: Node, x0: Any) -> bool:
     return may_enter(network.graph.modes[node[0]], network.parameter(node), x0)
 
 
-def _plan(network: Network, path: Path, wanted: Objective, x0: Any) -> Plan:
+def _plan(network: Network, path: Path, question: Question) -> Plan:
     nodes = [state[0] for state in path.states]
     return Plan.of(
         network.graph,
         [(name, network.parameter((name, a))) for name, a in nodes],
-        objective=wanted,
+        objective=question.wanted,
         cost=path.key.cost,
         margin=path.margin,
-        x0=x0,
+        x0=question.state,
+        bounded=lambda: _kept(network.graph)[1].bound(question),
     )
