@@ -93,10 +93,16 @@ class ContinuousReferences:
 
     # -- many pairs ------------------------------------------------------------------------------
 
-    def statuses(self, r_i: Any, r_j: Any) -> NDArray[np.int64]:
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """The classes of source and target: a Box of parameters, or the members of a finite one."""
+        return self._source, self._target
+
+    def statuses(self, r_i: Any, r_j: Any, members: tuple[int, int] = (0, 0)) -> NDArray[np.int64]:
         """1 certified, -1 refuted, 0 undecided, for pairs (B, k_i), (B, k_j) of continuous classes.
 
-        Of a finite class the first member counts; give it no column. Outside the classes nothing is said: 0.
+        A finite class has no columns; which of its members is meant is in ``members``. Outside the classes
+        nothing is said: 0.
         """
         source, target = np.atleast_2d(np.asarray(r_i, float)), np.atleast_2d(np.asarray(r_j, float))
         wanted = [side.dim if isinstance(side, Box) else 0 for side in (self._source, self._target)]
@@ -105,7 +111,7 @@ class ContinuousReferences:
                 f"statuses: give references (B, {wanted[0]}) of the source and (B, {wanted[1]}) of the target, "
                 f"not {source.shape} and {target.shape}"
             )
-        relation = self._relations.get((0, 0))
+        relation = self._relations.get(members)
         if relation is None:
             return np.zeros(len(source), np.int64)
         known = np.ones(len(source), bool)
@@ -236,6 +242,17 @@ class ContinuousReferences:
         source, target = self._split(z)
         left = _members(self._source, source, key[0])
         return list(zip(left, _members(self._target, target, key[1]), strict=True))
+
+    def plot(self, ax: Any = None, *, r_i: Any = None, r_j: Any = None, dims: tuple[int, ...] | None = None) -> Any:
+        """Draw which references are certified, undecided and refuted; returns the axes.
+
+        Two classes of one parameter each are drawn against each other. Otherwise the map is over one or two
+        parameters (``dims``) of the target, for the source's reference ``r_i``; or over those of the source,
+        where ``r_j`` is given. What is not given is in the middle of its class.
+        """
+        from modegraph.report.references import plot_references
+
+        return plot_references(self, ax, r_i, r_j, dims)
 
     # -- shape -----------------------------------------------------------------------------------
 
