@@ -19,6 +19,7 @@ from ..reach.compiled import CompiledMode, compile_mode
 from ..reach.flow import Flow, Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
 from ..reach.ladder import CURVED
+from ..reach.start import Chart, Piece
 from ..reach.tail import Tail, TailFailure, TailSearch
 from .crossing import proved_instants
 from .evidence import lasting, sampled_violation, slack_until, width_over_time
@@ -191,18 +192,35 @@ def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
 
 
 def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure:
-    """An invariant set from the ends of the flows on, its centre moving with the reference."""
+    """Invariant sets from the ends of the flows on, their centres moving with the reference: one for each part."""
+    found: list[Tail] = []
     for chain in chains:
         flow = chain.flows[-1]
         if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
             return TailFailure("the flowpipe ends before the loop has settled")
-    flows = [chain.flows[-1] for chain in chains]
-    field = flows[0].fields[-1]
-    if any(flow.fields[-1] is not field for flow in flows):
-        return TailFailure("the parts of the starts end in different coordinates")
-    order = Order(1, 0) if compiled.linear else chains[0].order
-    search = TailSearch(field, compiled.whole().chart, compiled.w_centre, compiled.w_radius, compiled.loop.names, order)
-    found = search.attempt(flows)
-    if isinstance(found, Tail) and not (found.face_upper <= 0.0).all():
-        return TailFailure("a constraint cannot be proved on the invariant set")
-    return found
+        order = Order(1, 0) if compiled.linear else chain.order
+        search = TailSearch(
+            flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
+        )
+        tail = search.attempt([flow])
+        if isinstance(tail, TailFailure):
+            return tail
+        if not (tail.face_upper <= 0.0).all():
+            return TailFailure("a constraint cannot be proved on the invariant set")
+        found.append(tail)
+    return Tail(
+        max(tail.start for tail in found),
+        np.max([tail.face_upper for tail in found], axis=0),
+        np.max([tail.tracking for tail in found], axis=0),
+        np.min([tail.lo for tail in found], axis=0),
+        np.max([tail.hi for tail in found], axis=0),
+        min(tail.decay for tail in found),
+    )
+
+
+def _own_chart(piece: Piece) -> Chart:
+    """The chart of a piece for the references and unknown constants that it is for: they do not change."""
+    lo, hi = piece.chart.unknown_lo.copy(), piece.chart.unknown_hi.copy()
+    for i in piece.uncertain.tolist():
+        lo[i], hi[i] = piece.unknown_range(i)
+    return replace(piece.chart, unknown_lo=lo, unknown_hi=hi)
