@@ -69,6 +69,23 @@ class Moments:
         """The moments do not depend on the reference, and this flow is for all of them."""
         return not self.rows[:, :, self.exponents.sum(axis=1) > 0].any() and self.whole
 
+    def over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
+        """Ranges (B, K, f) of y over boxes (B, k) of references, but for roundings of ROUNDED * size."""
+        a, b = (lo - self.middle) / self.scale, (hi - self.middle) / self.scale
+        low, high = np.ones((len(lo), len(self.exponents))), np.ones((len(lo), len(self.exponents)))
+        for v in range(lo.shape[1]):
+            e = self.exponents[:, v]
+            ends = a[:, [v]] ** e, b[:, [v]] ** e
+            least, most = np.minimum(*ends), np.maximum(*ends)
+            astride = (e > 0) & (e % 2 == 0) & (a[:, [v]] < 0.0) & (b[:, [v]] > 0.0)
+            least = np.where(astride, 0.0, least)
+            products = np.stack([low * least, low * most, high * least, high * most])
+            low, high = products.min(axis=0), products.max(axis=0)
+        up, down = np.maximum(self.rows, 0.0), np.minimum(self.rows, 0.0)
+        lowest = np.einsum("kfm,bm->bkf", up, low) + np.einsum("kfm,bm->bkf", down, high)
+        highest = np.einsum("kfm,bm->bkf", up, high) + np.einsum("kfm,bm->bkf", down, low)
+        return lowest, highest
+
 
 def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int) -> Moments | None:
     """The instants of a flow at which a switch may be proved; None where there is none."""
