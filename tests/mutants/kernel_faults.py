@@ -12,6 +12,34 @@ GENERATORS = "tests/enclosure/test_generators.py"
 
 KERNEL_FAULTS = (
     Fault(
+        "a relation is the union over the parts of the starts",
+        "enclosure/pairs.py",
+        "            worst = max(worst, best)\n",
+        "            worst = best if worst == -np.inf else min(worst, best)\n",
+        ("tests/enclosure/test_pairs.py",),
+    ),
+    Fault(
+        "a relation looks at the middle of the starts only",
+        "enclosure/pairs.py",
+        "+ spread[k, 0]) * (1.0 + ROUNDED)",
+        ") * (1.0 + ROUNDED)",
+        ("tests/enclosure/test_pairs.py",),
+    ),
+    Fault(
+        "a relation speaks of references outside its class",
+        "enclosure/pairs.py",
+        "        if not (_within(source, b, *classes[0], 0) and _within(target, b, *classes[1], 0)):",
+        "        if B < 0:",
+        ("tests/enclosure/test_pairs.py",),
+    ),
+    Fault(
+        "a part without starts for a reference is asked of another",
+        "enclosure/pairs.py",
+        "if not _within(source, b, lo, hi, part):",
+        "if part > 0 and not _within(source, b, lo, hi, part - 1):",
+        ("tests/enclosure/test_pairs.py",),
+    ),
+    Fault(
         "the remainder of a product forgets what it truncates",
         "enclosure/remainder.py",
         "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]",

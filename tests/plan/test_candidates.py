@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.plan.candidates import lattice, propose
+from modegraph.plan.candidates import End, Proposals, lattice
+from modegraph.plan.network import Network
 from tests.certify.class_graphs import double_integrators
 
 
@@ -20,15 +21,48 @@ def test_a_lattice_holds_the_corners_and_the_centre(dim: int) -> None:
     assert len(points) <= 40
 
 
-def test_proposals_lead_from_the_start_to_the_goal_in_certified_steps() -> None:
+def test_routes_walk_from_the_start_to_the_goal_in_certified_steps() -> None:
     graph = mg.build(double_integrators(1), horizon=20.0)
-    propose(graph, "wide", "narrow", [-0.83], [0.77], None)
-    known = np.sort([float(graph.parameter(("narrow", k))[0]) for k in graph.indices("narrow")])  # type: ignore[index]
-    for wanted in (-0.83, 0.77):
-        assert np.isclose(known, wanted).any()
-    between = known[(known >= -0.83) & (known <= 0.77)]
+    network = Network(graph)
+    start, goal = (End((name, 0), np.array(p)) for name, p in (("wide", [-0.83]), ("narrow", [0.77])))
+    Proposals(graph).along_routes(network, [start], [goal], frozenset(), ())
+    narrow = np.sort([float(p[0]) for p in network.proposed["narrow"]])
+    assert np.isclose(narrow, 0.77).any()
     # Starts of the narrow mode are balls of radius .1: steps of that length are certified.
-    assert np.diff(between).max() <= 0.1
-    before = len(graph.indices("narrow"))
-    propose(graph, "wide", "narrow", [-0.83], [0.77], None)
-    assert len(graph.indices("narrow")) == before
+    assert np.diff(narrow[narrow > -0.7]).max() <= 0.1
+    steps = [((("narrow", a), ("narrow", b))) for a in range(len(narrow)) for b in range(len(narrow))]
+    assert sum(network.certified(*step) for step in steps) >= 10
+
+
+def test_questions_leave_nothing_behind_in_the_graph() -> None:
+    graph = mg.build(double_integrators(1), horizon=20.0)
+    before = len(graph.nodes()), len(graph.pair_verdicts())
+    first = graph.plan("wide", "narrow", r_start=[-0.5], r_goal=[0.5])
+    graph.plan("wide", "narrow", r_start=[-0.2], r_goal=[0.5])
+    again = graph.plan("wide", "narrow", r_start=[-0.5], r_goal=[0.5])
+    assert (len(graph.nodes()), len(graph.pair_verdicts())) == before
+    assert np.array_equal(np.concatenate(first.references), np.concatenate(again.references))
+
+
+def test_an_end_may_be_a_box_of_references() -> None:
+    graph = mg.build(double_integrators(2), horizon=20.0)
+    goal = mg.Box([0.4, -0.3], [0.6, -0.1])
+    plan = graph.plan("wide", "narrow", r_start=[-0.5, 0.5], r_goal=goal, minimize="distance")
+    assert goal.contains(plan.references[-1])
+    with pytest.raises(mg.ModegraphError, match="no reference of 'narrow' is in that Box"):
+        graph.plan("wide", "narrow", r_goal=mg.Box([2.0, 2.0], [3.0, 3.0]))
+    with pytest.raises(mg.ModegraphError, match="2 parameters, not 1"):
+        graph.plan("wide", "narrow", r_start=mg.Box([0.0], [0.5]))
+
+
+def test_a_lattice_joins_what_is_certified() -> None:
+    graph = mg.build(double_integrators(1), horizon=20.0)
+    network = Network(graph)
+    Proposals(graph).everywhere(network)
+    assert len(network.proposed["wide"]) >= 27
+    for a in network.of("narrow"):
+        for b in network.of("wide"):
+            p, q = network.parameter(a), network.parameter(b)
+            assert p is not None
+            assert q is not None
+            assert network.certified(a, b) == graph.references("narrow", "wide").contains(p, q)

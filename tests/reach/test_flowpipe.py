@@ -378,3 +378,23 @@ def test_plot() -> None:
         with pytest.raises(mg.ModegraphError, match="dims"):
             pipe.plot(dims=bad)
     plt.close("all")
+
+
+def test_sections_hold_what_is_reached_and_little_more() -> None:
+    """A rotating disc stays a disc: its outlines are 64-gons around it."""
+    plant = mg.System(lambda x: np.array([x[1], -x[0]]), states="a b", inputs=0)
+    mode = mg.Mode("turn", plant, controller=lambda x: np.zeros(0), reference=mg.setpoint([0.0]),
+                   start=mg.Ball([1.0, 0.0], 0.2))  # fmt: skip
+    pipe = mg.flowpipe(mode, horizon=3.0)
+    for t in (0.0, 1.0, 3.0):
+        instant, (polygon,) = pipe.sections(t, ("a", "b"))
+        centre = np.array([np.cos(instant), -np.sin(instant)])
+        distance = np.linalg.norm(polygon - centre, axis=1)
+        assert (distance >= 0.2 - 1e-9).all()
+        assert (distance <= 0.2 / np.cos(np.pi / 64.0) + 1e-6).all()
+    with pytest.raises(mg.ModegraphError, match="two states"):
+        pipe.sections(1.0, ("a",))
+    axes = pipe.plot(dims=("a", "b"), sections=[0.0, 1.0], target=mg.Ball([0.0, -1.0], 0.5))
+    assert len(axes.patches) == 3
+    with pytest.raises(mg.ModegraphError, match="give dims"):
+        pipe.plot(sections=[0.0])

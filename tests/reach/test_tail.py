@@ -134,3 +134,49 @@ def test_a_class_of_references_has_one_invariant_set_for_all() -> None:
     x = runs(family, references(family, 400, rng), times, rng)
     assert (found.lo[:, None] - 1e-9 <= x).all()
     assert (x <= found.hi[:, None] + 1e-9).all()
+
+
+def line_class(limit: float = 9.0, gain: Callable[[Any], Any] = lambda r: 1.0) -> mg.Mode:
+    """x' = -gain(r) (x - 2 r) + x^2 / 100, held at any r in [-1, 1]."""
+    plant = mg.System(lambda x, u: u + 0.01 * x**2, states="x", inputs="u")
+    return mg.Mode(
+        "held", plant, controller=lambda x, r: -gain(r[0]) * (x - 2.0 * r),
+        reference=mg.setpoint(mg.Box([-1.0], [1.0])), start=lambda r: mg.Ball(2.0 * r, 0.1),
+        constraints=lambda x: {"high": x[0] <= limit},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_the_invariant_set_moves_with_the_equilibria_of_a_class(cut: bool) -> None:
+    compiled = compile_mode(line_class(), None)
+    order = Order(4, 3)
+    whole = compiled.whole()
+    pieces = whole.split(whole.variables - 1) if cut else [whole]
+    flows = []
+    for piece in pieces:
+        flow = Flow(compiled.fields, piece, compiled.w_centre, compiled.w_radius, order, names=compiled.loop.names)
+        while flow.time < 6.0:
+            assert flow.advance(6.0)
+        flows.append(flow)
+    search = TailSearch(compiled.fields[-1], whole.chart, compiled.w_centre, compiled.w_radius, flows[0].names, order)
+    found = search.attempt(flows)
+    assert isinstance(found, Tail), found
+    # x = 2 p + x^2 / 100 at rest.
+    rest = 50.0 * (1.0 - np.sqrt(1.0 - 0.08 * np.array([-1.0, 1.0])))
+    assert found.lo[0] <= rest[0] <= rest[1] <= found.hi[0]
+    # The sets around the equilibria are small: one around all of them alike would be 4 wide on each side.
+    assert found.hi[0] - found.lo[0] <= rest[1] - rest[0] + 0.5
+
+
+@pytest.mark.parametrize("limit, good", [(2.03, False), (2.15, True)])
+def test_a_class_is_safe_for_ever_only_if_its_last_reference_is(limit: float, good: bool) -> None:
+    """Starts reach 2.1; the reference p = 1 rests at 2.042."""
+    verdict = mg.build([line_class(limit)], horizon=6.0).check("held")
+    assert (verdict.status is mg.Status.CERTIFIED) is good
+
+
+@pytest.mark.parametrize("top, good", [(1.15, False), (0.5, True)])
+def test_one_reference_that_does_not_settle_is_enough(top: float, good: bool) -> None:
+    """The gain of the reference p = 1 is 1 - top: below 0 it leaves, after the horizon."""
+    verdict = mg.build([line_class(9.0, lambda r: 1.0 - top * r * r)], horizon=2.0).check("held")
+    assert (verdict.status is mg.Status.CERTIFIED) is good

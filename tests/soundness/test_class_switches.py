@@ -97,9 +97,7 @@ class Constant(np.ndarray[Any, Any]):
         return self
 
 
-def violations(
-    graph: mg.ModeGraph, loops: dict[str, Loop], pairs: int, runs: int, seed: int
-) -> tuple[int, list[str]]:
+def violations(graph: mg.ModeGraph, loops: dict[str, Loop], pairs: int, runs: int, seed: int) -> tuple[int, list[str]]:
     """Runs of certified pairs that are late, or break a limit before they arrive."""
     rng = np.random.default_rng(seed)
     found: list[str] = []

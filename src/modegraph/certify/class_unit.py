@@ -19,8 +19,10 @@ from ..reach.compiled import CompiledMode, compile_mode
 from ..reach.flow import Flow, Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
 from ..reach.ladder import CURVED
+from ..reach.start import Chart, Piece
+from ..reach.tail import Tail, TailFailure, TailSearch
 from .crossing import proved_instants
-from .evidence import sampled_violation, slack_until, width_over_time
+from .evidence import lasting, sampled_violation, slack_until, width_over_time
 from .moments import moments_of
 from .proof import SafetyProof, certified_check, least_slack
 from .relation import Part, Relation, whole_relation
@@ -66,6 +68,7 @@ def relate(
     end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
     chains = _legal_chains(compiled, end, deadline, progress)
     parameters = len(compiled.parameters)
+    region = mode.reference.region if p is None else None
     rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None
     relations: list[Relation | str] = []
     for spec in targets:
@@ -75,7 +78,7 @@ def relate(
             relations.append(str(error))
             continue
         parts = [_part(chain, goal, end, parameters) for chain in chains]
-        relations.append(whole_relation(parameters, goal, parts, rest))
+        relations.append(whole_relation(region, goal, parts, rest))
     slack = least_slack(slack_until(flow, k) for chain in chains for flow, k in _proved(chain))
     return ClassResult(relations, _check(compiled, chains), slack, end)
 
@@ -104,9 +107,7 @@ def _proved_until(chain: Chain) -> float:
     return float(found[-1][0].times[found[-1][1]]) if found else -1.0
 
 
-def _legal_chains(
-    compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]
-) -> list[Chain]:
+def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]) -> list[Chain]:
     """Chains that cover all starts, cut where a constraint cannot be proved, as long as that helps."""
     cutting = Cutting(compiled, end, deadline)
     chains, _ = cutting.run()
@@ -171,17 +172,55 @@ def _centre_in(mode: Mode, compiled: CompiledMode) -> list[Expr]:
 
 
 def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
-    """Assumption 1 for the whole class: proved as far as the flows go; for ever where nothing is to be proved."""
+    """Assumption 1 for the whole class: as far as the flows go, and for ever where a tail closes the time axis."""
     until = min(map(_proved_until, chains))
     last = compiled.fields[-1]
     widths = width_over_time(chains[0].flows[:1])
     if compiled.linear and not any(f.faces for f in compiled.fields) and until >= last.start:
         # A linear loop has a solution for all time, and there is nothing else to prove.
         return replace(certified_check(SafetyProof({}, until, np.full(last.outputs, np.inf))), widths=widths)
-    reason = (
-        f"constraints proved until t = {until:.4g} s for all references of the class; what comes later is not decided "
-        "for a continuous class yet: check one reference of it with mg.Points([...])"
-        if until >= 0.0
-        else "the constraints are not proved at the start for all references of the class"
+    if until < 0.0:
+        reason = "the constraints are not proved at the start for all references of the class"
+        return Verdict(Status.UNDECIDED, reason, until=0.0, widths=widths)
+    tail = _tail(compiled, chains)
+    if isinstance(tail, Tail):
+        return replace(
+            certified_check(lasting([flow for chain in chains for flow in chain.flows], tail)), widths=widths
+        )
+    reason = f"constraints proved until t = {until:.4g} s for all references of the class, not for ever: {tail.reason}"
+    return Verdict(Status.UNDECIDED, reason, until=until, widths=widths)
+
+
+def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure:
+    """Invariant sets from the ends of the flows on, their centres moving with the reference: one for each part."""
+    found: list[Tail] = []
+    for chain in chains:
+        flow = chain.flows[-1]
+        if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
+            return TailFailure("the flowpipe ends before the loop has settled")
+        order = Order(1, 0) if compiled.linear else chain.order
+        search = TailSearch(
+            flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
+        )
+        tail = search.attempt([flow])
+        if isinstance(tail, TailFailure):
+            return tail
+        if not (tail.face_upper <= 0.0).all():
+            return TailFailure("a constraint cannot be proved on the invariant set")
+        found.append(tail)
+    return Tail(
+        max(tail.start for tail in found),
+        np.max([tail.face_upper for tail in found], axis=0),
+        np.max([tail.tracking for tail in found], axis=0),
+        np.min([tail.lo for tail in found], axis=0),
+        np.max([tail.hi for tail in found], axis=0),
+        min(tail.decay for tail in found),
     )
-    return Verdict(Status.UNDECIDED, reason, until=max(until, 0.0), widths=widths)
+
+
+def _own_chart(piece: Piece) -> Chart:
+    """The chart of a piece for the references and unknown constants that it is for: they do not change."""
+    lo, hi = piece.chart.unknown_lo.copy(), piece.chart.unknown_hi.copy()
+    for i in piece.uncertain.tolist():
+        lo[i], hi[i] = piece.unknown_range(i)
+    return replace(piece.chart, unknown_lo=lo, unknown_hi=hi)

@@ -80,7 +80,7 @@ class ContinuousReferences:
         relation = self._relations.get((left[0], right[0]))
         if relation is None or self._trivial(left[1], right[1])[0]:
             return False
-        return bool(relation.crossings(left[1], right[1]).certified[0])
+        return bool(relation.certified(left[1], right[1])[0])
 
     def __contains__(self, pair: object) -> bool:
         return isinstance(pair, tuple | list) and len(pair) == 2 and self.contains(*pair)
@@ -93,10 +93,16 @@ class ContinuousReferences:
 
     # -- many pairs ------------------------------------------------------------------------------
 
-    def statuses(self, r_i: Any, r_j: Any) -> NDArray[np.int64]:
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """The classes of source and target: a Box of parameters, or the members of a finite one."""
+        return self._source, self._target
+
+    def statuses(self, r_i: Any, r_j: Any, members: tuple[int, int] = (0, 0)) -> NDArray[np.int64]:
         """1 certified, -1 refuted, 0 undecided, for pairs (B, k_i), (B, k_j) of continuous classes.
 
-        Of a finite class the first member counts; give it no column. Outside the classes nothing is said: 0.
+        A finite class has no columns; which of its members is meant is in ``members``. Outside the classes
+        nothing is said: 0.
         """
         source, target = np.atleast_2d(np.asarray(r_i, float)), np.atleast_2d(np.asarray(r_j, float))
         wanted = [side.dim if isinstance(side, Box) else 0 for side in (self._source, self._target)]
@@ -105,14 +111,14 @@ class ContinuousReferences:
                 f"statuses: give references (B, {wanted[0]}) of the source and (B, {wanted[1]}) of the target, "
                 f"not {source.shape} and {target.shape}"
             )
-        relation = self._relations.get((0, 0))
+        relation = self._relations.get(members)
         if relation is None:
             return np.zeros(len(source), np.int64)
         known = np.ones(len(source), bool)
         for side, p in ((self._source, source), (self._target, target)):
             if isinstance(side, Box):
                 known &= ((p >= side.lo) & (p <= side.hi)).all(axis=1)
-        certified = relation.crossings(source, target).certified & ~self._trivial(source, target)
+        certified = relation.certified(source, target) & ~self._trivial(source, target)
         return np.where(known, np.where(certified, 1, np.where(relation.refuted(source, target), -1, 0)), 0)
 
     def sample(self, n: int, seed: int | None = None) -> list[tuple[Parameter, Parameter]]:
@@ -179,9 +185,7 @@ class ContinuousReferences:
                 return False
         return True
 
-    def _within(
-        self, key: tuple[int, int], r_i: Floats | None, r_j: Floats | None
-    ) -> tuple[Floats, Floats] | None:
+    def _within(self, key: tuple[int, int], r_i: Floats | None, r_j: Floats | None) -> tuple[Floats, Floats] | None:
         """Box of joint parameters with given references; None where they name other members."""
         lo, hi = (side.copy() for side in self._bounds)
         k = self._source.dim if isinstance(self._source, Box) else 0
@@ -238,6 +242,17 @@ class ContinuousReferences:
         source, target = self._split(z)
         left = _members(self._source, source, key[0])
         return list(zip(left, _members(self._target, target, key[1]), strict=True))
+
+    def plot(self, ax: Any = None, *, r_i: Any = None, r_j: Any = None, dims: tuple[int, ...] | None = None) -> Any:
+        """Draw which references are certified, undecided and refuted; returns the axes.
+
+        Two classes of one parameter each are drawn against each other. Otherwise the map is over one or two
+        parameters (``dims``) of the target, for the source's reference ``r_i``; or over those of the source,
+        where ``r_j`` is given. What is not given is in the middle of its class.
+        """
+        from modegraph.report.references import plot_references
+
+        return plot_references(self, ax, r_i, r_j, dims)
 
     # -- shape -----------------------------------------------------------------------------------
 
@@ -341,19 +356,21 @@ class ContinuousReferences:
 
 
 def _find(side: Side, r: Any) -> tuple[int, Floats] | None:
-    """Position and parameters (1, k) of a reference of one side; None if it is not there."""
+    """Position and parameters (1, k) of a reference of one side; None if it is not there.
+
+    Whether a continuous class contains it is left to the relation.
+    """
     if not isinstance(side, Box):
         index = match_parameter(side, r)
         return None if index is None else (index, np.zeros((1, 0)))
     try:
-        p = np.atleast_1d(np.asarray(r, dtype=float))
+        p = np.asarray(r, dtype=float)
     except (TypeError, ValueError):
         return None
-    return (0, p[None]) if p.shape == (side.dim,) and side.contains(p) else None
+    return (0, p.reshape(1, -1)) if p.size == side.dim and p.ndim < 2 else None
 
 
 def _members(side: Side, values: Floats, index: int) -> Sequence[Parameter]:
     if isinstance(side, Box):
         return list(values)
     return [side[index]] * len(values)
-

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..expression.evaluate import Evaluator
 from ..reach.flow import Flow
 from ..reach.framing import generator_box
-from .proof import least_slack
+from ..reach.tail import Tail
+from .proof import SafetyProof, least_slack
 from .samples import sample_powers
 from .verdict import Widths
 
@@ -35,6 +36,13 @@ def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
     for name, value in zip(names, upper, strict=True):
         out[name] = min(-float(value), out.get(name, np.inf))
     return out
+
+
+def lasting(flows: Sequence[Flow], tail: Tail) -> SafetyProof:
+    """The constraints for all time: over flows that lead to where a tail begins, and behind it."""
+    after = _by_name(flows[-1].fields[-1].faces, tail.face_upper)
+    tracking = np.max([tail.tracking, *(step.tracking for flow in flows for step in flow.steps)], axis=0)
+    return SafetyProof(least_slack([*(slack_until(f, len(f.steps)) for f in flows), after]), tail.start, tracking)
 
 
 def width_over_time(flows: Sequence[Flow]) -> Widths | None:

@@ -23,7 +23,7 @@ from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
-from .evidence import sampled_violation, slack_until
+from .evidence import lasting, sampled_violation, slack_until
 from .findings import Findings, better, merge, settle
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
@@ -456,13 +456,7 @@ class Exploration:
                 # A linear loop has a solution for all time, and there is nothing else to prove.
                 return SafetyProof({}, flow.time, np.full(last.outputs, np.inf))
             return None
-        after: dict[str, float] = {}
-        for name, upper in zip(last.faces, tail.face_upper, strict=True):
-            after[name] = min(-float(upper), after.get(name, np.inf))
-        passed = [*before, *flows]
-        tracking = np.max([tail.tracking, *(s.tracking for f in passed for s in f.steps)], axis=0)
-        slack = least_slack([*(slack_until(f, len(f.steps)) for f in passed), after])
-        return SafetyProof(slack, tail.start, tracking)
+        return lasting([*before, *flows], tail)
 
     def _unproved(self, flow: Flow, proved: int) -> str:
         if proved < 0:

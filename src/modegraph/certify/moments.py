@@ -12,20 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import TINY, UNIT
+from ..enclosure.rounding import UNIT
 from ..reach.class_chart import parameters_of, scale_of
 from ..reach.flow import Flow
 from ..reach.quadric import Quadric, generator_sizes
 from .crossing import proved_instants
-from .samples import powers_at
 from .target_class import TargetClass
 
 Floats = NDArray[np.float64]
 
 MOST_INSTANTS = 32
 """Looks at one flow that a relation keeps."""
-ROUNDED = 1e-12
-"""More than all roundings of one inequality, relative to the sizes of its terms (a few hundred units)."""
 
 
 @dataclass(frozen=True)
@@ -36,64 +33,41 @@ class Moments:
     ----------
     lo, hi : (k,) arrays
         The parameters this flow is for.
+    whole : bool
+        It is for every reference of the class.
     times, energy : (K,) arrays
         Seconds, and bounds of int u'u until then.
+    middle, scale : (k,) arrays
+        The moments are polynomials in (p - middle) / scale, monomials ``exponents`` (m, k).
+    rows : (K, f, m) array
+        Coefficients of y; ``size`` (K, f) bounds the terms that were rounded.
+    spread : (K, f) or, of a round target, (K, 1) array
+    farthest : float
+        Bounds |m| + spread.
     """
 
     lo: Floats
     hi: Floats
+    whole: bool
     times: Floats
     energy: Floats
-    target: TargetClass
-    _middle: Floats
-    _radius: Floats
-    _index: list[int]
-    _exponents: NDArray[np.int64]
-    _rows: Floats
-    _size: Floats
-    _spread: Floats
-    _farthest: float
-    whole: bool = True
-    """This flow is for every reference of the class."""
+    middle: Floats
+    scale: Floats
+    exponents: NDArray[np.int64]
+    rows: Floats
+    size: Floats
+    spread: Floats
+    farthest: float
 
     @property
     def affine(self) -> bool:
         """The moments are affine in the reference."""
-        return not self._rows[:, :, self._exponents.sum(axis=1) > 1].any()
+        return not self.rows[:, :, self.exponents.sum(axis=1) > 1].any()
 
     @property
     def is_constant(self) -> bool:
         """The moments do not depend on the reference, and this flow is for all of them."""
-        return not self._rows[:, :, self._exponents.sum(axis=1) > 0].any() and self.whole
-
-    def holds(self, p: Floats) -> NDArray[np.bool_]:
-        """Which references (B, k) this flow is for."""
-        return np.asarray(((p >= self.lo) & (p <= self.hi)).all(axis=1))
-
-    def gauges(self, source: Floats, target: Floats) -> Floats:
-        """Upper bounds (B, K) of the gauge in S_j(target) of what can be reached under source; <= 1: inside.
-
-        source (B, ki), target (B, kj)
-        """
-        eta = (source[:, self._index] - self._middle) / self._radius
-        powers = powers_at(eta, self._exponents)
-        rows = self.target.rows
-        centre, radius, limits = self.target.at(target)
-        y = np.einsum("kfj,bj->bkf", self._rows, powers) - (centre @ rows.T)[:, None]
-        size = self._size + (np.abs(centre) @ np.abs(rows).T)[:, None]
-        # What a rounded row misses counts for x - c as a whole.
-        error = ROUNDED * size + (radius @ np.abs(rows).T)[:, None] + TINY
-        error = error + (self._farthest + np.abs(centre).max(axis=1, initial=0.0)[:, None, None]) * self.target.slack
-        with np.errstate(divide="ignore", invalid="ignore"):
-            if self.target.round:
-                length = np.sqrt(((np.abs(y) + error) ** 2).sum(axis=2)) * self.target.grow * (1.0 + ROUNDED)
-                gauge = (length + self._spread[:, 0]) * (1.0 + ROUNDED) / limits
-            else:
-                reach = y + error + self._spread
-                reach = reach + ROUNDED * np.abs(reach)
-                gauge = np.where(reach <= 0.0, np.where(limits[:, None] > 0.0, reach / limits[:, None], 0.0),
-                                 reach / limits[:, None]).max(axis=2)  # fmt: skip
-        return np.asarray(np.where(np.isnan(gauge), np.inf, gauge))
+        return not self.rows[:, :, self.exponents.sum(axis=1) > 0].any() and self.whole
 
 
 def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int) -> Moments | None:
@@ -116,18 +90,19 @@ def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int)
     G = [g[:, :n] for _, g in sets]
     rest = p.copy()
     rest[:, :, pure] = 0.0
-    scales = [scale_of(flow.piece, v) for v, _ in own]
-    ranges = [flow.piece.unknown_range(int(flow.piece.uncertain[v - flow.piece.chart.free])) for v, _ in own]
     lo, hi = np.full(parameters, -np.inf), np.full(parameters, np.inf)
-    for (_, k), (a, b) in zip(own, ranges, strict=True):
-        lo[k], hi[k] = a, b
+    middle, scale = np.zeros(parameters), np.ones(parameters)
+    powers = np.zeros((len(pure), parameters), np.int64)
+    for v, k in own:
+        lo[k], hi[k] = flow.piece.unknown_range(int(flow.piece.uncertain[v - flow.piece.chart.free]))
+        middle[k], scale[k] = scale_of(flow.piece, v)
+        powers[:, k] = exponents[pure, v]
     return Moments(
-        lo, hi, flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), target,
-        np.array([c for c, _ in scales]), np.array([r for _, r in scales]), [k for _, k in own],
-        exponents[pure][:, ~others], np.einsum("fi,kij->kfj", target.rows, p[:, :, pure]),
+        lo, hi, all(flow.piece.lo[v] == -1.0 and flow.piece.hi[v] == 1.0 for v, _ in own),
+        flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers,
+        np.einsum("fi,kij->kfj", target.rows, p[:, :, pure]),
         np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(flow, target, rest, G),
         float(np.abs(p).sum(axis=2).max() + max(np.abs(g).sum() for g in G)),
-        all(flow.piece.lo[v] == -1.0 and flow.piece.hi[v] == 1.0 for v, _ in own),
     )  # fmt: skip
 
 
@@ -156,6 +131,6 @@ def at_state(x: Floats, target: TargetClass) -> Moments:
     size = (np.abs(target.rows) @ np.abs(x))[None]
     spread = np.zeros((1, 1 if target.round else len(target.rows)))
     return Moments(
-        none, none, np.zeros(1), np.zeros(1), target, none, none, [], np.zeros((1, 0), np.int64), rows, size, spread,
+        none, none, True, np.zeros(1), np.zeros(1), none, none, np.zeros((1, 0), np.int64), rows, size, spread,
         float(np.abs(x).sum()),
     )  # fmt: skip

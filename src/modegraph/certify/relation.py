@@ -9,10 +9,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..enclosure.pairs import first_crossings, part_gauges
+from ..model.sets import Box
 from .moments import Moments
 from .target_class import TargetClass
 
@@ -24,10 +28,6 @@ class Part:
     """One part of the starts of the source: the flows that carry it on, each with its instants."""
 
     flows: tuple[Moments, ...]
-
-    def holds(self, source: Floats) -> NDArray[np.bool_]:
-        """For which references (B, ki) of the source this part has starts."""
-        return self.flows[0].holds(source)
 
     def meets(self, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
         """For boxes (B, ki) of references: whether this part may have starts for some of them."""
@@ -58,8 +58,8 @@ class Relation:
 
     Attributes
     ----------
-    source, target : int
-        Numbers of parameters.
+    region : Box or None
+        The class of references of the source (None: a single one); that of the target is in ``goal``.
     parts : tuple of Part
         They cover all starts; none where some part has no usable instant: nothing is proved then.
     rest : TargetClass or None
@@ -67,13 +67,19 @@ class Relation:
         that stays there for ever.
     """
 
-    source: int
+    region: Box | None
     goal: TargetClass
     parts: tuple[Part, ...]
     rest: TargetClass | None
 
     @property
+    def source(self) -> int:
+        """Number of parameters of the source."""
+        return 0 if self.region is None else self.region.dim
+
+    @property
     def target(self) -> int:
+        """Number of parameters of the target."""
         return self.goal.parameters
 
     @property
@@ -89,30 +95,84 @@ class Relation:
         fixed = self.goal.affine is not None and not self.goal.affine[1].any()
         return all(flow.is_constant for flow in flows), fixed
 
-    def crossings(self, source: Floats, target: Floats) -> Crossings:
-        """Decide pairs: source (B, ki) and target (B, kj) references, inside their classes."""
-        B = len(source)
-        gauge = np.full(B, -np.inf) if self.parts else np.full(B, np.inf)
-        latest, energy = np.zeros(B), np.zeros(B)
-        met = np.zeros(B, bool)
-        for part in self.parts:
-            here = np.flatnonzero(part.holds(source))
-            if not len(here):
-                continue
-            met[here] = True
-            found = [flow.gauges(source[here], target[here]) for flow in part.flows]
-            g = np.concatenate(found, axis=1)
-            times = np.concatenate([flow.times for flow in part.flows])
-            spent = np.concatenate([flow.energy for flow in part.flows])
-            first = np.argmax(g <= 1.0, axis=1)
-            proved = (g <= 1.0).any(axis=1)
-            gauge[here] = np.maximum(gauge[here], g.min(axis=1))
-            latest[here] = np.maximum(latest[here], np.where(proved, times[first], np.inf))
-            energy[here] = np.maximum(energy[here], np.where(proved, spent[first], np.inf))
-        gauge[~met] = np.inf
-        latest[gauge > 1.0] = np.inf
-        energy[gauge > 1.0] = np.inf
-        return Crossings(gauge, latest, energy)
+    @cached_property
+    def arrival(self) -> tuple[Floats, Floats, Floats]:
+        """Where the middle of the starts ends up, against the target, in gauges: y + Y p - Z p' (f,), (f, ki), (f, kj).
+
+        Linearised, in floats, and a guess for planning: 0 is the centre of the target.
+        """
+        ends = [part.flows[-1] for part in self.parts]
+        y = np.mean([end.rows[-1] @ (end.exponents.sum(axis=1) == 0) for end in ends], axis=0)
+        slopes = []
+        for end in ends:
+            first = [end.rows[-1] @ ((end.exponents[:, v] == 1) & (end.exponents.sum(axis=1) == 1))
+                     for v in range(self.source)]  # fmt: skip
+            slopes.append(np.array(first).reshape(self.source, len(y)).T / end.scale)
+        Y = np.mean(slopes, axis=0)
+        y = y - np.mean([slope @ end.middle for slope, end in zip(slopes, ends, strict=True)], axis=0)
+        c0, C = self.goal.about
+        limits = np.maximum(self.goal.at(self.goal.middle)[2][0], 1e-12)
+        return (y - self.goal.rows @ c0) / limits, Y / limits[:, None], self.goal.rows @ C / limits[:, None]
+
+    def crossings(self, source: Floats, target: Floats, quick: bool = False) -> Crossings:
+        """Decide pairs: source (B, ki) and target (B, kj) references; outside their classes nothing is certified.
+
+        With ``quick``, of a gauge it only counts whether it is at most 1.
+        """
+        if not self.parts:
+            nothing = np.full(len(source), np.inf)
+            return Crossings(nothing, nothing, nothing)
+        gauge, instant = self._decided(source, target, quick)
+        table, found = self._seconds, gauge <= 1.0
+        # The last row stands for a part that has no starts for a reference.
+        known = np.where(instant == -2, len(table) - 1, instant)
+        worst = np.where(found[:, None], table[known].max(axis=1), np.inf)
+        return Crossings(gauge, worst[:, 0], worst[:, 1])
+
+    def certified(self, source: Floats, target: Floats) -> NDArray[np.bool_]:
+        """Which pairs are certified, as fast as can be."""
+        if not self.parts:
+            return np.zeros(len(source), bool)
+        return np.asarray(self._decided(source, target, True)[0] <= 1.0)
+
+    def _decided(self, source: Floats, target: Floats, quick: bool) -> tuple[Floats, NDArray[np.int64]]:
+        found = first_crossings(
+            np.ascontiguousarray(source), np.ascontiguousarray(target), self._classes, *self.goal.at(target),
+            *self._table, quick,
+        )  # fmt: skip
+        return found[0], found[1]
+
+    @cached_property
+    def _classes(self) -> tuple[tuple[Floats, Floats], ...]:
+        sides = [(np.zeros(0), np.zeros(0)) if s is None else (s.lo, s.hi) for s in (self.region, self.goal.region)]
+        return tuple((np.array(lo, float)[None], np.array(hi, float)[None]) for lo, hi in sides)
+
+    @cached_property
+    def _seconds(self) -> Floats:
+        """Times and energies (T + 1, 2) of the instants in the table; the last row counts nothing."""
+        flows = [flow for part in self.parts for flow in part.flows]
+        rows = np.stack([np.concatenate([f.times for f in flows]), np.concatenate([f.energy for f in flows])], axis=1)
+        return np.vstack([rows, np.zeros((1, 2))])
+
+    @cached_property
+    def _table(self) -> tuple[Any, ...]:
+        """The target's rows and the instants of all parts, as the kernels of `enclosure.pairs` want them."""
+        flows = [flow for part in self.parts for flow in part.flows]
+        goal = self.goal
+
+        def firsts(counts: Sequence[int]) -> NDArray[np.int64]:
+            return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+        return (
+            np.ascontiguousarray(goal.rows, float), goal.slack, goal.round, goal.grow,
+            firsts([len(part.flows) for part in self.parts]),
+            np.stack([part.flows[0].lo for part in self.parts]), np.stack([part.flows[0].hi for part in self.parts]),
+            np.stack([f.middle for f in flows]), np.stack([f.scale for f in flows]),
+            firsts([len(f.exponents) for f in flows]), np.concatenate([f.exponents for f in flows]),
+            firsts([len(f.times) for f in flows]), firsts([f.rows.size for f in flows]),
+            np.concatenate([f.rows.ravel() for f in flows]), np.array([f.farthest for f in flows]),
+            np.concatenate([f.size for f in flows]), np.concatenate([f.spread for f in flows]),
+        )  # fmt: skip
 
     def refuted(self, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """Pairs (B,) for which a start of i is proved to rest outside S_j for ever."""
@@ -130,7 +190,6 @@ class Relation:
             return np.asarray(np.sqrt((least**2).sum(axis=1)) * (1.0 - 1e-12) > limits[:, 0] * self.goal.grow)
         return np.asarray((y - error > limits * (1.0 + 1e-12)).any(axis=1))
 
-
     def cells(
         self, lo: tuple[Floats, Floats], hi: tuple[Floats, Floats]
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -138,7 +197,6 @@ class Relation:
 
         Where centre and moments are affine, gauges are convex in both references: largest at a corner.
         """
-        k = self.source
         joint_lo, joint_hi = np.concatenate(lo, axis=1), np.concatenate(hi, axis=1)
         B = len(joint_lo)
         straight = self.goal.affine is not None and (self.rest is None or self.rest.affine is not None)
@@ -147,11 +205,12 @@ class Relation:
         z = corners(joint_lo, joint_hi)
         count = z.shape[1]
         flat = z.reshape(-1, z.shape[2])
-        source, target = flat[:, :k], flat[:, k:]
+        source, target = np.ascontiguousarray(flat[:, : self.source]), flat[:, self.source :]
         certified = np.full(B, bool(self.parts))
-        for part in self.parts:
-            found = [flow.gauges(source, target) for flow in part.flows]
-            worst = np.concatenate(found, axis=1).reshape(B, count, -1).max(axis=1)
+        there = self.goal.at(target)
+        for k, part in enumerate(self.parts):
+            found = part_gauges(k, source, *there, *self._table)
+            worst = found.reshape(B, count, -1).max(axis=1)
             apart = ~part.meets(lo[0], hi[0])
             certified &= (worst.min(axis=1) <= 1.0) | apart
         separated = self._separated(source, target).reshape(B, count, -1)
@@ -194,7 +253,9 @@ def corners(lo: Floats, hi: Floats) -> Floats:
     return np.where(signs[None] > 0.0, hi[:, None], lo[:, None])
 
 
-def whole_relation(source: int, goal: TargetClass, parts: Sequence[Part | None], rest: TargetClass | None) -> Relation:
+def whole_relation(
+    region: Box | None, goal: TargetClass, parts: Sequence[Part | None], rest: TargetClass | None
+) -> Relation:
     """The relation of all parts; without a usable instant in some part nothing is proved."""
     known = [part for part in parts if part is not None]
-    return Relation(source, goal, tuple(known) if known and len(known) == len(parts) else (), rest)
+    return Relation(region, goal, tuple(known) if known and len(known) == len(parts) else (), rest)

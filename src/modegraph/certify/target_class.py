@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.intervals import IntervalEvaluator
+from ..enclosure.pairs import affine_centres
 from ..errors import ModegraphError
 from ..expression.derivative import derivative
 from ..expression.scalar import Expr
@@ -67,36 +68,79 @@ class TargetClass:
     @cached_property
     def affine(self) -> tuple[Floats, Floats] | None:
         """c(p) = c0 + C p, (n,) and (n, k), where c is affine and the limits are fixed; None elsewhere."""
+        return None if self._line is None else self._line[:2]
+
+    def over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats, Floats]:
+        """For planning: ranges (B, f) of rows c(p) over boxes (B, k) of references, and the largest limits."""
+        if self._line is not None:
+            c0, C, _, _, high = self._line
+            slopes = self.rows @ C
+            middle, radius = 0.5 * (lo + hi) @ slopes.T + self.rows @ c0, 0.5 * (hi - lo) @ np.abs(slopes).T
+            return middle - radius, middle + radius, np.tile(high, (len(lo), 1))
+        low, top, _ = self._tape(np.ascontiguousarray(lo.T), np.ascontiguousarray(hi.T))
+        centre, reach = (0.5 * side[: self.dim].T for side in (low + top, top - low))
+        sizes = np.tile(self._limits, (len(lo), 1)) if len(top) == self.dim else np.maximum(top[self.dim :].T, 0.0)
+        if len(top) > self.dim and not self.round:
+            sizes = np.concatenate([sizes, sizes], axis=1)
+        about, radius = centre @ self.rows.T, reach @ np.abs(self.rows).T
+        return about - radius, about + radius, sizes
+
+    @property
+    def middle(self) -> Floats:
+        """The middle (1, k) of the class."""
+        return np.zeros((1, 0)) if self.region is None else np.asarray(self.region.center, float)[None]
+
+    @cached_property
+    def about(self) -> tuple[Floats, Floats]:
+        """c(p) near c0 + C p, (n,) and (n, k): exact where c is affine, else secants through the class, a guess."""
+        if self.affine is not None:
+            return self.affine
+        assert self.region is not None
+        middle, reach = self.middle[0], 0.5 * (self.region.hi - self.region.lo)
+        ends = np.array([[self.at((middle + s * step)[None])[0][0] for s in (-1.0, 1.0)] for step in np.diag(reach)])
+        C = ((ends[:, 1] - ends[:, 0]) / np.maximum(2.0 * reach, 1e-300)[:, None]).T
+        return self.at(self.middle)[0][0] - C @ middle, C
+
+    @cached_property
+    def _line(self) -> tuple[Floats, Floats, Floats, Floats, Floats] | None:
+        """c0, C, what c0 may be off by, and the limits from below and from above."""
         if not isinstance(self._centre, StartClass):
-            return self._centre, np.zeros((self.dim, self.parameters))
+            nothing = np.zeros((self.dim, self.parameters))
+            return self._centre, nothing, np.zeros(self.dim), self._limits, self._limits
         exprs = _numbers(self._centre)
         slopes = derivative(exprs, self._centre.parameters)
-        if not all(e.is_constant for row in slopes for e in row) or not all(
-            e.is_constant for e in exprs[self.dim :]
-        ):
+        if not all(e.is_constant for row in slopes for e in row) or not all(e.is_constant for e in exprs[self.dim :]):
             return None
-        low, high, _ = self._tape(np.zeros((self.parameters, 1)), np.zeros((self.parameters, 1)))
+        centre, radius, low, high = self._evaluated(np.zeros((1, self.parameters)))
         C = np.array([[float(e.value) for e in row] for row in slopes[: self.dim]])
-        return 0.5 * (low + high)[: self.dim, 0], C
+        return centre[0], C, radius[0], low[0], high[0]
+
+    def _evaluated(self, p: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Centres (B, n), what they may be off by, and limits from below and from above (B, f or 1), in intervals."""
+        n = self.dim
+        low, high, _ = self._tape(np.ascontiguousarray(p.T), np.ascontiguousarray(p.T))
+        low, high = low.T, high.T
+        centre = 0.5 * low[:, :n] + 0.5 * high[:, :n]
+        radius = np.maximum(high[:, :n] - centre, centre - low[:, :n])
+        own = [np.maximum(side[:, n:], 0.0) for side in (low, high)]
+        radius = radius + ROUNDED * (np.abs(centre) + own[1].max(axis=1, initial=0.0)[:, None])
+        if not own[0].shape[1]:
+            own = [np.tile(self._limits, (len(p), 1))] * 2
+        elif not self.round:
+            own = [np.concatenate([side, side], axis=1) for side in own]
+        return centre, radius, np.ascontiguousarray(own[0]), np.ascontiguousarray(own[1])
 
     def at(self, p: Floats, outer: bool = False) -> tuple[Floats, Floats, Floats]:
         """Centres (B, n), radii (B, n) around the true ones and limits (B, f or 1) for references p (B, k).
 
         S_j contains the set with these limits around the true centre; with ``outer`` it is contained in it.
         """
-        B, n = len(p), self.dim
-        if not isinstance(self._centre, StartClass):
-            centre = np.broadcast_to(self._centre, (B, n))
-            return centre, np.zeros((B, n)), np.broadcast_to(self._limits, (B, len(self._limits)))
-        low, high, _ = self._tape(np.ascontiguousarray(p.T), np.ascontiguousarray(p.T))
-        low, high = low.T, high.T
-        centre = 0.5 * low[:, :n] + 0.5 * high[:, :n]
-        own = np.maximum((high if outer else low)[:, n:], 0.0)
-        radius = np.maximum(high[:, :n] - centre, centre - low[:, :n])
-        radius = radius + ROUNDED * (np.abs(centre) + own.max(axis=1, initial=0.0)[:, None])
-        if not own.shape[1]:
-            return centre, radius, np.broadcast_to(self._limits, (B, len(self._limits)))
-        return centre, radius, own if self.round else np.concatenate([own, own], axis=1)
+        if self._line is None:
+            centre, radius, low, high = self._evaluated(p)
+            return centre, radius, high if outer else low
+        c0, C, off, low, high = self._line
+        found = affine_centres(np.ascontiguousarray(p, float), c0, C, off, high if outer else low)
+        return found[0], found[1], found[2]
 
 
 def target_class(mode: Mode | Target, p: Floats | None, plant: int) -> TargetClass:
@@ -144,9 +188,7 @@ def _fixed(target: Set, name: str, plant: int | None = None, region: Box | None 
     shape = Region(target)
     centre = np.asarray(shape.centre, float)
     if hasattr(shape, "quadric"):
-        return TargetClass(
-            target.dim, region, True, shape.T, np.zeros_like(shape.T), shape.grow, centre, np.ones(1)
-        )
+        return TargetClass(target.dim, region, True, shape.T, np.zeros_like(shape.T), shape.grow, centre, np.ones(1))
     distance = shape.b - shape.A @ centre
     slack = 1e-14 * (np.abs(shape.b) + np.abs(shape.A) @ np.abs(centre))
     return TargetClass(target.dim, region, False, shape.A, shape.dA, 1.0, centre, distance - slack)

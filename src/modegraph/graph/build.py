@@ -175,9 +175,7 @@ def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None]) -> 
     if not unit.linked:
         assert finite is not None
         return _Result(finite, {})
-    found = relate(
-        unit.mode, unit.parameter, unit.linked, horizon=unit.horizon, deadline=deadline, progress=progress
-    )
+    found = relate(unit.mode, unit.parameter, unit.linked, horizon=unit.horizon, deadline=deadline, progress=progress)
     return _Result(finite or UnitResult([], found.check), unit.links(found.relations, found.slack))
 
 

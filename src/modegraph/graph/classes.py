@@ -1,4 +1,4 @@
-"""Continuous classes in a graph: relations instead of single verdicts, and the references named so far."""
+"""Continuous classes in a graph: relations instead of single verdicts."""
 
 from __future__ import annotations
 
@@ -45,28 +45,11 @@ class Classes:
     ----------
     regions : mode name to the Box of its parameters
     links : every ordered pair of nodes with a continuous class in it
-    named : mode name to the references of its class that were asked for, in that order
     """
 
     regions: Mapping[str, Box]
     links: Mapping[tuple[Key, Key], Link]
-    named: dict[str, list[Floats]] = field(default_factory=dict)
-    _position: dict[tuple[str, bytes], int] = field(default_factory=dict)
-    _pairs: dict[tuple[str, str], tuple[int, int, dict[tuple[Key, Key], Verdict]]] = field(default_factory=dict)
     _references: dict[tuple[str, str], ContinuousReferences] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for name in self.regions:
-            self.named.setdefault(name, [])
-
-    def position(self, name: str, p: Floats) -> int:
-        """Position of a reference among those named of its class; it is remembered."""
-        # -0.0 and 0.0 are one number.
-        key = name, (p + 0.0).tobytes()
-        if key not in self._position:
-            self._position[key] = len(self.named[name])
-            self.named[name].append(p)
-        return self._position[key]
 
     def involves(self, *names: str) -> bool:
         return any(name in self.regions for name in names)
@@ -83,42 +66,12 @@ class Classes:
             self._references[i, j] = ContinuousReferences(sides[0], sides[1], relations, i == j)
         return self._references[i, j]
 
-    def pairs(self, i: str, j: str, parameters: Mapping[str, Sequence[Parameter]]) -> Mapping[tuple[Key, Key], Verdict]:
-        """Verdicts of the certified pairs of named references."""
-        left, right = parameters[i], parameters[j]
-        known = self._pairs.get((i, j), (0, 0, {}))
-        if known[:2] == (len(left), len(right)):
-            return known[2]
-        found = dict(known[2])
-        for (s, t), link in self.links.items():
-            if s[0] != i or t[0] != j or isinstance(link.relation, str):
-                continue
-            sources = range(len(left)) if i in self.regions else [s[1]]
-            targets = range(len(right)) if j in self.regions else [t[1]]
-            grid = [(a, b) for a in sources for b in targets if (a >= known[0] or b >= known[1]) and (i, a) != (j, b)]
-            if not grid:
-                continue
-            source = self._values(i, [a for a, _ in grid])
-            target = self._values(j, [b for _, b in grid])
-            crossings = link.relation.crossings(source, target)
-            for k in np.flatnonzero(crossings.certified):
-                a, b = grid[k]
-                gauge, latest = float(crossings.gauge[k]), float(crossings.latest[k])
-                found[(i, a), (j, b)] = _certified(link, gauge, latest, float(crossings.energy[k]))
-        self._pairs[i, j] = len(left), len(right), found
-        return found
-
-    def _values(self, name: str, positions: Sequence[int]) -> Floats:
-        if name not in self.regions:
-            return np.zeros((len(positions), 0))
-        return np.array([self.named[name][k] for k in positions]).reshape(len(positions), self.regions[name].dim)
-
-    def verdict(self, source: Key, target: Key) -> Verdict:
-        """One pair of references, for continuous classes by their position among those named."""
-        link = self.links[self._node(source), self._node(target)]
+    def verdict(self, source: Key, target: Key, p: Parameter, q: Parameter) -> Verdict:
+        """One pair of references, given by their parameters where the class is continuous."""
+        link = self.links[source, target]
         if isinstance(link.relation, str):
             return Verdict(Status.UNDECIDED, link.relation, horizon=link.horizon)
-        left, right = self._values(source[0], [source[1]]), self._values(target[0], [target[1]])
+        left, right = self.row(source[0], p), self.row(target[0], q)
         crossings = link.relation.crossings(left, right)
         gauge = float(crossings.gauge[0])
         if gauge <= 1.0:
@@ -126,6 +79,13 @@ class Classes:
         if link.relation.refuted(left, right)[0]:
             return _resting(link.relation, left, right)
         return _missed(link, gauge)
+
+    def row(self, name: str, p: Parameter) -> Floats:
+        """A reference as one row (1, k) for a relation; without columns where the class is finite."""
+        if name not in self.regions:
+            return np.zeros((1, 0))
+        assert p is not None
+        return np.asarray(p, float)[None]
 
     def existential(
         self, i: str, j: str, r_i: Floats | None, r_j: Floats | None, refs: ContinuousReferences
@@ -159,13 +119,10 @@ class Classes:
     def entered(self, name: str, mode: Mode | Target, x: Floats) -> ContinuousReferences | None:
         """The references under which a mode may be entered from x (n,), proved; None: none is found."""
         goal = target_class(mode, None, len(x))
-        relation = Relation(0, goal, (Part((at_state(x, goal),)),), None)
+        relation = Relation(None, goal, (Part((at_state(x, goal),)),), None)
         refs = ContinuousReferences((None,), self.regions[name], {(0, 0): relation}, False)
         best = refs.best(None, None)
         return refs if best is not None and best[3] <= 1.0 else None
-
-    def _node(self, key: Key) -> Key:
-        return (key[0], 0) if key[0] in self.regions else key
 
 
 def _text(p: NDArray[np.float64]) -> str:

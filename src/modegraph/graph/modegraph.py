@@ -17,7 +17,7 @@ from modegraph.certify.references import Cell, Parameter, References, parameter_
 from modegraph.certify.verdict import Status, Verdict, Widths
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.aggregate import Case, every_member, some_pair
-from modegraph.graph.classes import Classes
+from modegraph.graph.classes import Classes, Floats, Link
 from modegraph.graph.entry import may_enter, plain_state
 from modegraph.graph.submodes import Edge, Submode, algorithm_1
 from modegraph.graph.switch import Switch
@@ -68,19 +68,18 @@ class ModeGraph:
     ) -> None:
         """Collect the verdicts of all ordered pairs of nodes and the check of every node.
 
-        A continuous class is one node, (name, 0), in ``checks`` and in the links of ``classes``; the
-        references of it that are named become nodes as they are asked for.
+        A continuous class is one node, (name, 0), in ``checks`` and in the links of ``classes``.
         """
         self._modes = {m.name: m for m in modes}
         self._verdicts = dict(verdicts)
         self._checks = dict(checks)
         self._classes = classes or Classes({}, {})
         self._parameters: dict[str, Sequence[Parameter]] = {
-            m.name: (None,) if isinstance(m, Target) else tuple(m.reference.parameters())
+            m.name: (None,)
+            if isinstance(m, Target) or m.name in self._classes.regions
+            else tuple(m.reference.parameters())
             for m in modes
-            if m.name not in self._classes.regions
         }
-        self._parameters = {name: self._parameters.get(name, self._classes.named.get(name, ())) for name in self._modes}
 
     @property
     def modes(self) -> Mapping[str, Mode | Target]:
@@ -118,19 +117,31 @@ class ModeGraph:
 
     def _class_verdict(self, i: str, j: str, r_i: Any, r_j: Any) -> Verdict:
         self._running(i, "no switch starts in it")
-        left, right = (self._named(name, r) for name, r in ((i, r_i), (j, r_j)))
+        left, right = (self._member(name, r) for name, r in ((i, r_i), (j, r_j)))
         if left is not None and right is not None:
-            if (i, left) == (j, right):
+            (a, p), (b, q) = left, right
+            if i == j and (a == b if p is None or q is None else np.array_equal(p, q)):
                 raise ModegraphError(f"mode {i!r}: a switch from a reference to itself means nothing")
-            return self._classes.verdict((i, left), (j, right))
-        known = [None if a is None else self._parameters[name][a] for name, a in ((i, left), (j, right))]
+            return self._classes.verdict((i, a), (j, b), p, q)
+        known = [None if side is None else side[1] for side in (left, right)]
         return self._classes.existential(i, j, known[0], known[1], self.references(i, j))
 
-    def _named(self, name: str, r: Any) -> int | None:
-        """Position of the reference r of a mode; None where that leaves several."""
+    def _member(self, name: str, r: Any) -> tuple[int, Parameter] | None:
+        """Position and parameters of the reference r of a mode; None where that leaves several."""
         if r is None and self.has_choice(name):
             return None
-        return self.indices(name, r)[0]
+        if name in self._classes.regions:
+            return 0, self.find(name, r)
+        index = self.indices(name, r)[0]
+        return index, self._parameters[name][index]
+
+    def find(self, name: str, r: Any) -> Floats:
+        """The parameters of a reference of a continuous class; an error names the mode and what exists."""
+        mode = self._modes[name]
+        assert isinstance(mode, Mode)
+        p = mode.find(r)
+        assert p is not None
+        return p
 
     def references(self, i: str, j: str) -> ContinuousReferences:
         """R^ij where one of the classes is continuous."""
@@ -157,7 +168,8 @@ class ModeGraph:
         """
         name = self._running(self.name_of(i), "there is nothing to check in it")
         if name in self._classes.regions:
-            self.indices(name, r)
+            if r is not None:
+                self.find(name, r)
             return self._checks[name, 0]
         return every_member([(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)])
 
@@ -327,16 +339,12 @@ class ModeGraph:
         return name
 
     def indices(self, name: str, r: Any = None) -> list[int]:
-        """Positions in the class of mode ``name`` that ``r`` names; all that are known for None."""
+        """Positions in the finite class of mode ``name`` that ``r`` names; all of them for None."""
         mode = self._modes[name]
         if r is None:
             return list(range(len(self._parameters[name])))
         if isinstance(mode, Target):
             raise ModegraphError(f"target {name!r} has no references, but {r!r} was given")
-        if name in self._classes.regions:
-            p = mode.find(r)
-            assert p is not None
-            return [self._classes.position(name, p)]
         return [mode.match(r)]
 
     def has_choice(self, name: str) -> bool:
@@ -344,30 +352,31 @@ class ModeGraph:
         return name in self._classes.regions or len(self._parameters[name]) > 1
 
     def parameter(self, node: Node) -> Parameter:
-        """The reference of a node."""
+        """The reference of a node of a finite class."""
         return self._parameters[node[0]][node[1]]
 
     def nodes(self) -> list[Node]:
-        """All nodes in mode order, then class order."""
-        return [(name, a) for name, p in self._parameters.items() for a in range(len(p))]
+        """All nodes of finite classes, in mode order, then class order."""
+        return [(n, a) for n, p in self._parameters.items() if n not in self.regions for a in range(len(p))]
 
     def pair_verdicts(self) -> Mapping[tuple[Node, Node], Verdict]:
-        """The verdict of every ordered pair of different nodes; of continuous classes, the certified pairs."""
-        found = dict(self._verdicts)
-        for i, j in {(s[0], t[0]): None for s, t in self._classes.links}:
-            found |= self._classes.pairs(i, j, self._parameters)
-        return MappingProxyType(found)
+        """The verdict of every ordered pair of different nodes of finite classes."""
+        return MappingProxyType(self._verdicts)
 
-    def node_check(self, node: Node) -> Verdict:
+    @property
+    def links(self) -> Mapping[tuple[Node, Node], Link]:
+        """What is known of every ordered pair of nodes with a continuous class, (name, 0), in it."""
+        return self._classes.links
+
+    def goal_check(self, name: str, p: Parameter) -> Verdict:
         """The check of one mode under one reference."""
-        return self._checks[(node[0], 0) if node[0] in self._classes.regions else node]
+        mode = self._modes[name]
+        return self._checks[name, mode.match(p) if isinstance(mode, Mode) and name not in self.regions else 0]
 
-    def pair_switch(self, source: Node, target: Node) -> Switch:
-        """The certified switch for one pair of references."""
-        continuous = self._classes.involves(source[0], target[0])
-        v = self._classes.verdict(source, target) if continuous else self._verdicts[source, target]
-        pair = References([self.parameter(source)], [self.parameter(target)], [(0, 0)])
-        return _switch_of(source[0], target[0], pair, v)
+    def pair_switch(self, i: str, j: str, p: Parameter, q: Parameter) -> Switch:
+        """The certified switch for one pair of references, given by their parameters."""
+        pair = References([p], [q], [(0, 0)])
+        return _switch_of(i, j, pair, self.verdict(i, j, p, q))
 
     @cached_property
     def _algorithm_1(self) -> tuple[tuple[Submode, ...], tuple[Edge, ...]]:

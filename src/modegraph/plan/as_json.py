@@ -101,6 +101,8 @@ def plan_data(plan: Plan) -> dict[str, Any]:
         "time": plan.time,
         "energy": plan.energy,
         "cost": plan.cost,
+        "bound": plan.bound,
+        "gap": plan.gap,
         "margin": plan.margin,
         "objective": plan.objective,
         "goal_check": verdict_data(plan.goal_check),

@@ -1,54 +1,155 @@
 """References a plan may choose in continuous classes: floats propose, R^ij decides.
 
-Every reference proposed becomes a node of the search, joined to the others by certified pairs only.
+First those of the routes from the start to the goal, and steps where a route walks within one class; where
+they lead nowhere, a lattice of every class as well.
 """
 
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.target_class import TargetClass, target_class
+from modegraph.certify.continuous import ContinuousReferences
+from modegraph.certify.target_class import target_class
 from modegraph.errors import ModegraphError
+from modegraph.model.mode import Mode
 from modegraph.model.sets import Box
+from modegraph.plan.network import Network
+from modegraph.plan.question import End
+from modegraph.plan.routes import Route, Routes
 
 if TYPE_CHECKING:
-    from modegraph.graph.modegraph import ModeGraph
+    from modegraph.graph.modegraph import ModeGraph, Node
 
 Floats = NDArray[np.float64]
 
 LATTICE = 27
-"""References of every class that are always among the candidates."""
+"""References of every class that are tried where the routes lead nowhere."""
 MOST_STEPS = 64
-"""Candidates on one line between two places."""
-MOST_PLACES = 8
-STRIDES = 0.98 * 2.0 ** -np.arange(0.0, 10.0, 0.5)
-"""Parts of a line tried as one step, longest first."""
+"""References on one walk."""
+STRIDES = np.concatenate([[1.0], 0.98 * 2.0 ** -np.arange(0.0, 10.0, 0.5)])
+"""Parts of what is left of a walk that are tried as one step, longest first."""
+FINER = (1.0, 1.5, 2.0, 3.0)
+"""A walk is also tried in so many times the fewest steps, of equal length: short steps are quick."""
+MOST_WALKS = 12
+"""Walks from one question that are followed."""
 
 
-def propose(
-    graph: ModeGraph, start: str | None, goal: str, r_start: Any, r_goal: Any, x0: Floats | None
-) -> None:
-    """Name candidates in every continuous class of the graph: a lattice, those whose start set is centred
-    at the places of the question and of the finite modes, and steps along the lines between these.
-    """
-    centres = _Centres(graph)
-    for name, r in ((start, r_start), (goal, r_goal)):
-        if name is not None and name in graph.regions and r is not None:
-            graph.indices(name, r)
-    places = centres.places(start, goal, r_start, r_goal, x0)
-    for name, region in graph.regions.items():
-        for p in lattice(region):
-            graph.indices(name, p)
-        images = [image for place in places if (image := centres.image(name, place)) is not None]
-        for image in images:
-            graph.indices(name, image)
-        for a, b in itertools.combinations(images, 2):
-            for p in _steps(graph, name, a, b):
-                graph.indices(name, p)
+class Proposals:
+    """What plans of one graph are made of; kept from question to question."""
+
+    def __init__(self, graph: ModeGraph) -> None:
+        self.graph = graph
+        self.routes = Routes(graph)
+        self._centres: dict[str, tuple[Floats, Floats] | None] = {}
+
+    def along_routes(
+        self, network: Network, starts: Sequence[End], goals: Sequence[End], avoid: frozenset[str], via: Sequence[str]
+    ) -> None:
+        """Propose the references of all routes between the ends, and join them where they are certified."""
+        chains: list[tuple[Route, list[Node]]] = []
+        for start, goal in itertools.product(starts, goals):
+            for route in self.routes.between(start.stop, goal.stop, avoid, via):
+                chains.append((route, _nodes(network, route, start, goal)))
+        network.connect(pair for _, nodes in chains for pair in itertools.pairwise(nodes))
+        walks = 0
+        for route, nodes in chains:
+            links = list(itertools.pairwise(nodes))
+            if not all(network.certified(*link) or route.walks(k) for k, link in enumerate(links)):
+                continue
+            for a, b in links:
+                if a[0] == b[0] and a != b and a[0] in self.graph.regions and walks < MOST_WALKS:
+                    walks += self._walk(network, a, b)
+
+    def everywhere(self, network: Network) -> None:
+        """Propose a lattice of every class, and join everything that is certified."""
+        known = {name: list(network.of(name)) for name in self.graph.regions}
+        for name, region in self.graph.regions.items():
+            for p in lattice(region):
+                network.propose(name, p)
+            for a, b in itertools.islice(itertools.permutations(known[name], 2), MOST_WALKS):
+                self._walk(network, a, b)
+        nodes = network.nodes()
+        network.connect((a, b) for a in nodes for b in nodes)
+
+    def _walk(self, network: Network, source: Node, target: Node) -> bool:
+        """Propose steps on the line between two references of one class; whether that was new."""
+        name = source[0]
+        a, b = network.parameter(source), network.parameter(target)
+        assert a is not None
+        assert b is not None
+        fewest = self._steps(name, a, b)
+        for factor in FINER if fewest else ():
+            count = round(factor * fewest)
+            line = a + np.linspace(0.0, 1.0, count + 1)[1:-1, None] * (b - a)
+            nodes = [source, *(network.propose(name, p) for p in line), target]
+            network.connect(itertools.pairwise(nodes))
+        return True
+
+    def _steps(self, name: str, a: Floats, b: Floats) -> int:
+        """How many certified steps lead from a to b, as few as were found; 0: no way was found."""
+        refs = self.graph.references(name, name)
+        here = a
+        for count in range(1, MOST_STEPS):
+            ahead = here + STRIDES[:, None] * (b - here)
+            ahead[0] = b
+            status = refs.statuses(np.repeat(here[None], len(ahead), axis=0), ahead)
+            good = np.flatnonzero(status == 1)
+            if not len(good):
+                return 0
+            if good[0] == 0:
+                # Steps of equal length may be fewer.
+                while count > 1 and self._even(refs, a, b, count - 1):
+                    count -= 1
+                return count
+            here = ahead[good[0]]
+        return 0
+
+    @staticmethod
+    def _even(refs: ContinuousReferences, a: Floats, b: Floats, count: int) -> bool:
+        """Whether so many equal steps from a to b are all certified."""
+        line = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
+        line[-1] = b
+        return bool((refs.statuses(line[:-1], line[1:]) == 1).all())
+
+    def image(self, name: str, place: Floats) -> Floats | None:
+        """The reference of a class whose start set is centred nearest to a place (least squares, clipped)."""
+        if name not in self._centres:
+            mode = self.graph.modes[name]
+            assert isinstance(mode, Mode)
+            try:
+                self._centres[name] = target_class(mode, None, len(place)).about
+            except ModegraphError:
+                self._centres[name] = None
+        known = self._centres[name]
+        if known is None:
+            return None
+        c0, C = known
+        region = self.graph.regions[name]
+        middle = np.asarray(region.center, float)
+        p = middle + np.linalg.pinv(C) @ (place - c0 - C @ middle)
+        return np.clip(p, region.lo, region.hi)
+
+
+def _nodes(network: Network, route: Route, start: End, goal: End) -> list[Node]:
+    """The nodes of a route, with what is known of its ends."""
+    last = len(route.stops) - 1
+    fixed: dict[int, Floats] = {}
+    bounds: dict[int, tuple[Floats, Floats]] = {}
+    for k, end in ((0, start), (last, goal)):
+        if end.p is not None:
+            fixed[k] = end.p
+        elif end.within is not None:
+            bounds[k] = end.within.lo, end.within.hi
+    found = route.references(fixed, bounds)
+    regions: Mapping[str, Box] = network.graph.regions
+    return [
+        network.propose(stop[0], p) if stop[0] in regions else stop for stop, p in zip(route.stops, found, strict=True)
+    ]
 
 
 def lattice(region: Box) -> Floats:
@@ -59,69 +160,3 @@ def lattice(region: Box) -> Floats:
         axes = [axis[[0, -1]] for axis in axes]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, region.dim)
     return np.clip(np.vstack([np.asarray(region.center)[None], points]), region.lo, region.hi)
-
-
-def _steps(graph: ModeGraph, name: str, a: Floats, b: Floats) -> Floats:
-    """References on the line from a to b, so far apart that changing to the next is certified where that is found."""
-    if np.array_equal(a, b):
-        return np.zeros((0, len(a)))
-    refs = graph.references(name, name)
-    ahead = a + STRIDES[:, None] * (b - a)
-    fine = np.flatnonzero(refs.statuses(np.repeat(a[None], len(ahead), axis=0), ahead) == 1)
-    stride = float(STRIDES[fine[0]]) if len(fine) else 0.25
-    count = min(MOST_STEPS, int(np.ceil(1.0 / stride)))
-    return a + np.linspace(0.0, 1.0, count + 1)[1:-1, None] * (b - a)
-
-
-class _Centres:
-    """Where the start sets of modes are centred, and which reference of a class centres its own at a place."""
-
-    def __init__(self, graph: ModeGraph) -> None:
-        self.graph = graph
-        self._classes: dict[str, TargetClass | None] = {}
-
-    def places(self, start: str | None, goal: str, r_start: Any, r_goal: Any, x0: Floats | None) -> list[Floats]:
-        """States that matter: those of the question first, then of the finite modes."""
-        found = [] if x0 is None else [x0]
-        for name, r in ((start, r_start), (goal, r_goal)):
-            if name is not None:
-                place = self.place(name, r)
-                found += [] if place is None else [place]
-        others = [self.place(name, None) for name in self.graph.modes if name not in self.graph.regions]
-        found += [place for place in others if place is not None]
-        unique = list({place.tobytes(): place for place in found}.values())
-        return unique[:MOST_PLACES]
-
-    def place(self, name: str, r: Any) -> Floats | None:
-        """The centre of the start set; None for a class without a reference, where that matters."""
-        if name in self.graph.regions:
-            goal = self._class(name)
-            if goal is None:
-                return None
-            fixed = goal.affine is not None and not goal.affine[1].any()
-            if r is None and not fixed:
-                return None
-            p = np.asarray(self.graph.regions[name].center if r is None else np.atleast_1d(r), float)
-            return np.array(goal.at(p[None])[0][0])
-        goal = self._class(name)
-        return None if goal is None else np.array(goal.at(np.zeros((1, 0)))[0][0])
-
-    def image(self, name: str, place: Floats) -> Floats | None:
-        """The reference of a class whose start set is centred nearest to a place (least squares, clipped)."""
-        goal = self._class(name)
-        if goal is None or goal.affine is None or len(place) != goal.dim:
-            return None
-        c0, C = goal.affine
-        region = self.graph.regions[name]
-        p = np.linalg.lstsq(C, place - c0, rcond=None)[0]
-        return np.clip(p, region.lo, region.hi)
-
-    def _class(self, name: str) -> TargetClass | None:
-        if name not in self._classes:
-            mode = self.graph.modes[name]
-            p = None if name in self.graph.regions else self.graph.parameter((name, 0))
-            try:
-                self._classes[name] = target_class(mode, p, self.graph.dimension)
-            except ModegraphError:
-                self._classes[name] = None
-        return self._classes[name]

@@ -42,32 +42,37 @@ class Objective:
     weights: Mapping[str, Fraction]
     bottleneck: bool = False
     travelled: bool = False
+    grain: float = 0.0
+    """Distances are rounded up to multiples of this, so that many short steps are not less than one long."""
 
-    def cost(self, verdict: Verdict, r_i: Parameter = None, r_j: Parameter = None) -> Cost:
-        """The cost of one certified switch; a switch without an energy bound costs an infinity."""
+    def cost(self, time: float, energy: float | None, r_i: Parameter = None, r_j: Parameter = None) -> Cost:
+        """The cost of one certified switch with its latest time; an infinity where the energy has no bound."""
         infinite, total = 0, Fraction(0)
         if self.travelled:
-            total += _distance(r_i, r_j)
+            total += _distance(r_i, r_j, self.grain)
         for what, weight in self.weights.items():
             if weight == 0:
                 continue
-            amount = _amount(what, verdict)
-            if amount is None:
+            amount = 1.0 if what == "switches" else time if what == "time" else energy
+            if amount is None or not math.isfinite(amount):
                 infinite += 1
             else:
-                total += weight * amount
+                total += weight * Fraction(amount)
         return infinite, total
 
 
-def _distance(r_i: Parameter, r_j: Parameter) -> Fraction:
+def _distance(r_i: Parameter, r_j: Parameter, grain: float) -> Fraction:
     """Euclidean distance in reference space; between references of different size there is none to go."""
     if r_i is None or r_j is None or len(r_i) != len(r_j):
         return Fraction(0)
-    return Fraction(math.dist(r_i, r_j))
+    distance = math.dist(r_i, r_j)
+    return Fraction(math.ceil(distance / grain)) * Fraction(grain) if grain else Fraction(distance)
 
 
-def objective(minimize: Any) -> Objective:
+def objective(minimize: Any, size: float = 0.0) -> Objective:
     """The objective named by ``minimize``: a name, or non-negative weights by name.
+
+    ``size``: of the classes of references; distances count to 1e-9 of it.
 
     Raises
     ------
@@ -84,7 +89,9 @@ def objective(minimize: Any) -> Objective:
     if minimize == "margin":
         return Objective("margin", {}, bottleneck=True)
     if minimize == "distance":
-        return Objective("distance", {}, travelled=True)
+        return Objective(
+            "distance", {}, travelled=True, grain=2.0 ** math.floor(math.log2(1e-9 * size)) if size else 0.0
+        )
     return Objective(minimize, {minimize: Fraction(1)})
 
 
@@ -100,13 +107,6 @@ def _weighted(weights: Mapping[Any, Any]) -> Objective:
             raise ModegraphError(f"plan: the weight of {what!r} must be a finite number >= 0, not {weight!r}")
         exact[what] = Fraction(number)
     return Objective(" + ".join(f"{weights[w]:g} {w}" for w in weights), exact)
-
-
-def _amount(what: str, verdict: Verdict) -> Fraction | None:
-    if what == "switches":
-        return Fraction(1)
-    value = latest(verdict) if what == "time" else verdict.energy
-    return None if value is None or not math.isfinite(value) else Fraction(value)
 
 
 def latest(verdict: Verdict) -> float:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -18,7 +19,7 @@ from modegraph.model.target import Target
 from modegraph.plan.objectives import Cost, Objective
 
 if TYPE_CHECKING:
-    from modegraph.graph.modegraph import ModeGraph, Node
+    from modegraph.graph.modegraph import ModeGraph
     from modegraph.run.simulate import Run
 
 
@@ -63,27 +64,29 @@ class Plan:
     warnings: tuple[str, ...]
     x0: Any = None
     graph: ModeGraph = field(repr=False, kw_only=True)
+    bounded: Callable[[], float] = field(repr=False, kw_only=True)
 
     @classmethod
     def of(
         cls,
         graph: ModeGraph,
-        nodes: Sequence[Node],
+        stops: Sequence[tuple[str, Parameter]],
         *,
         objective: Objective,
         cost: Cost,
         margin: float | None,
         x0: Any,
+        bounded: Callable[[], float],
     ) -> Plan:
-        """The plan along ``nodes`` of ``graph``, whose consecutive pairs are all certified."""
-        switches = [graph.pair_switch(s, t) for s, t in pairwise(nodes)]
+        """The plan along ``stops``, a mode and a reference each, whose consecutive pairs are all certified."""
+        switches = [graph.pair_switch(i, j, p, q) for (i, p), (j, q) in pairwise(stops)]
         energies = [s.energy for s in switches]
         known = [Fraction(e) for e in energies if e is not None and math.isfinite(e)]
         energy = rounded_up(sum(known, Fraction(0))) if len(known) == len(energies) else None
-        goal_check = _goal_check(graph, nodes[-1])
+        goal_check = _goal_check(graph, *stops[-1])
         return cls(
-            modes=[name for name, _ in nodes],
-            references=[graph.parameter(node) for node in nodes],
+            modes=[name for name, _ in stops],
+            references=[p for _, p in stops],
             switches=switches,
             time=(
                 rounded_down(sum((Fraction(s.time[0]) for s in switches), Fraction(0))),
@@ -94,10 +97,24 @@ class Plan:
             margin=margin,
             objective=objective.name,
             goal_check=goal_check,
-            warnings=_warnings(nodes[-1][0], goal_check, objective, cost),
+            warnings=_warnings(stops[-1][0], goal_check, objective, cost),
             x0=x0,
             graph=graph,
+            bounded=bounded,
         )
+
+    @cached_property
+    def bound(self) -> float:
+        """No plan made of what is certified costs less, whatever references it chooses (a float computation).
+
+        Equal to ``cost`` where all classes are finite: their best plan is found exactly.
+        """
+        return min(self.cost, self.bounded()) if self.graph.regions else self.cost
+
+    @property
+    def gap(self) -> float:
+        """How much a better choice of references might still save: cost - bound."""
+        return self.cost - self.bound if math.isfinite(self.cost) else 0.0
 
     def simulate(self, x0: Any = None, plant: Any = None, force: bool = False, *, stay: float | None = None) -> Run:
         """Integrate the real closed loop with its switching logic; see ``modegraph.run.simulate``.
@@ -160,6 +177,8 @@ class Plan:
         lines.append(f"  in {self.modes[-1]!r} between {self.time[0]:.4g} and {self.time[1]:.4g} s, certified")
         if self.energy is not None:
             lines.append(f"  energy at most {self.energy:.4g}")
+        if self.graph.regions:
+            lines.append(f"  {self.objective}: {self.cost:.4g}; no choice of references gets below {self.bound:.4g}")
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 
@@ -184,11 +203,8 @@ def _cost(objective: Objective, cost: Cost, margin: float | None, switches: int)
     return switches if objective.name == "switches" else rounded_up(cost[1])
 
 
-def _goal_check(graph: ModeGraph, node: Node) -> Verdict:
-    name, _ = node
-    if isinstance(graph.modes[name], Target):
-        return only_entered(name)
-    return graph.node_check(node)
+def _goal_check(graph: ModeGraph, name: str, p: Parameter) -> Verdict:
+    return only_entered(name) if isinstance(graph.modes[name], Target) else graph.goal_check(name, p)
 
 
 def _warnings(goal: str, check: Verdict, objective: Objective, cost: Cost) -> tuple[str, ...]:

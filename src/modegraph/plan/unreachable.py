@@ -40,14 +40,12 @@ class _Moves:
         self.certified: dict[Node, list[Node]] = {}
         self.undecided: dict[Node, list[Node]] = {}
         self.instant: set[tuple[Node, Node]] = set()
+        for arc in (arc for arcs in problem.arcs.values() for arc in arcs if arc.target[0] not in problem.avoid):
+            self.certified.setdefault(arc.source, []).append(arc.target)
+            if arc.latest == 0:
+                self.instant.add((arc.source, arc.target))
         for (source, target), v in graph.pair_verdicts().items():
-            if target[0] in problem.avoid:
-                continue
-            if v.status is Status.CERTIFIED:
-                self.certified.setdefault(source, []).append(target)
-                if v.time is not None and v.time[1] == 0:
-                    self.instant.add((source, target))
-            elif v.status is Status.UNDECIDED:
+            if v.status is Status.UNDECIDED and target[0] not in problem.avoid:
                 self.undecided.setdefault(source, []).append(target)
 
     def starts(self) -> list[Step]:

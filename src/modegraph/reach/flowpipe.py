@@ -24,7 +24,7 @@ from .flow import Order
 from .ladder import class_orders, is_light, orders
 from .looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
 from .restrictor import Restrictor
-from .slices import Slice, Slicer, hull
+from .slices import Slice, Slicer, hull, outline
 from .start import Piece
 
 Floats = NDArray[np.float64]
@@ -172,17 +172,47 @@ class Flowpipe:
                 found.append((slice(int(first), int(last)), lo[index], hi[index]))
         return self.times, found
 
-    def plot(self, ax: Any = None, dims: int | str | Sequence[int | str] | None = None) -> Any:
+    def sections(self, t: float, dims: Sequence[int | str]) -> tuple[float, list[Floats]]:
+        """Outlines of the reach set in the plane of two states, at the instant of the grid next to t (seconds).
+
+        Returns
+        -------
+        (float, list of (k, 2) arrays)
+            The instant, and one polygon around each part; together they hold every state that is possible.
+        """
+        pair = self._dims(dims)
+        if pair is None or len(pair) != 2:
+            raise ModegraphError(f"{self._label}: flowpipe.sections: dims takes two states")
+        instant = float(self.times[np.argmin(np.abs(self.times - self._instant(t, "t")))])
+        found = []
+        for slicer in self._slicers:
+            k = int(np.argmin(np.abs(slicer.times - instant)))
+            if slicer.times[k] == instant and (k > 0 or instant == 0.0):
+                found.append(outline(slicer, k, (pair[0], pair[1])))
+        return instant, found
+
+    def plot(
+        self,
+        ax: Any = None,
+        dims: int | str | Sequence[int | str] | None = None,
+        *,
+        sections: Sequence[float] | None = None,
+        target: Set | None = None,
+    ) -> Any:
         """Draw the boxes of the flowpipe and return the axes.
 
         Parameters
         ----------
         dims : state number(s) or name(s), optional
             One state: over time. Two: the phase plane. None: all states over time.
+        sections : seconds, optional
+            In the phase plane: outlines of the reach set at these instants, instead of all boxes.
+        target : Set, optional
+            To be drawn too: its outline in the phase plane, or its range over time.
         """
         from modegraph.report.flowpipes import plot_flowpipe
 
-        return plot_flowpipe(self, ax, self._dims(dims))
+        return plot_flowpipe(self, ax, self._dims(dims), sections, target)
 
     def _dims(self, dims: int | str | Sequence[int | str] | None) -> tuple[int, ...] | None:
         if dims is None:

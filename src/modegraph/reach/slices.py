@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 CELL_WORK = 2e6
 """Bisections of one face times the size of the polynomial: the work spent on one bound."""
 MOST_CELLS, LEAST_CELLS = 400, 20
+DIRECTIONS = 64
+"""Half-planes around a section that is drawn; a multiple of four."""
 STRAIGHT = 1e-3
 """A polynomial whose nonlinear part has less than this share in its width is not bisected."""
 
@@ -73,6 +75,13 @@ class Slicer:
             return self.instant(k)
         return Slice(self, self._chord(k - 1, t), self.swell[k - 1])
 
+    def support(self, k: int, dims: tuple[int, int], directions: Floats) -> Floats:
+        """Upper bounds (h,) of u . (two states) at instant k over unit vectors u (h, 2)."""
+        p, G = self.flow.state_set(k)
+        upper = self.flow.bounds.upper(directions @ p[list(dims)])
+        spread = np.abs(np.einsum("hi,gim->hgm", directions, G[:, list(dims)])).sum(axis=(1, 2))
+        return np.asarray(upper + spread * (1.0 + 1e-12) + 1e-12 * np.abs(p[list(dims)]).sum())
+
     def over(self, t0: float, t1: float) -> list[Slice]:
         """Slices whose common hull holds everything passed in [t0, t1], t0 < t1, within the flow."""
         first = int(np.searchsorted(self.times, t0, side="right")) - 1
@@ -103,6 +112,21 @@ class Slicer:
             total = straight + bounds.refined_upper(rest, limit - straight, cells)
             best = min(best, float(np.nextafter(total, np.inf)))
         return best
+
+
+def outline(slicer: Slicer, k: int, dims: tuple[int, int]) -> Floats:
+    """A polygon (v, 2) around two states at instant k: where half-planes in many directions meet."""
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    u = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    h = slicer.support(k, dims, u)
+    middle = 0.5 * np.array([h[0] - h[DIRECTIONS // 2], h[DIRECTIONS // 4] - h[3 * DIRECTIONS // 4]])
+    # A set without width is drawn with a little.
+    h = np.maximum(h - u @ middle, 1e-9 * (np.abs(h).max() + 1e-300))
+    corners = HalfspaceIntersection(np.column_stack([u, -h]) / h.max() * [h.max(), h.max(), 1.0], np.zeros(2))
+    points = corners.intersections * h.max()
+    return np.asarray(points[ConvexHull(points).vertices] + middle)
 
 
 def hull(slices: Sequence[Slice]) -> tuple[Floats, Floats]:

@@ -3,7 +3,8 @@
 A parallelotope B that contains the reach set is taken as a start set of its own; when its flow lies
 inside B again, B is invariant for the sampled loop, and the flow in between covers all later time.
 Valid because the last segment does not depend on time and the class of disturbances does not either.
-Containment in B holds for all unknown constants at once, hence for each of them.
+Containment in B holds for all unknown constants at once, hence for each of them. For a class of references
+the centre of B moves with the parameters, as the equilibria do: B(p) = c + T (p - middle) / radius + axes.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..enclosure.rounding import TINY, UNIT
+from .class_chart import parameters_of, scale_of
 from .field import Field
 from .float_loop import FloatLoop
 from .flow import Flow, Order
@@ -83,7 +86,12 @@ class TailSearch:
         self.order = order
         self.states = relevant_states(fld)
         self.possible = bool(np.isinf(fld.end)) and fld.autonomous
-        self._floats = FloatLoop(fld, w_centre, w_radius, chart.unknown_lo, chart.unknown_hi)
+        self._whole = Piece.whole(chart)
+        self._tilt = np.zeros((fld.states, len(self._whole.uncertain)))
+        self._floats = self._loop(chart.unknown_lo, chart.unknown_hi)
+
+    def _loop(self, lo: Floats, hi: Floats) -> FloatLoop:
+        return FloatLoop(self.fld, self.w_centre, self.w_radius, lo, hi)
 
     def attempt(self, flows: Sequence[Flow]) -> Tail | TailFailure:
         """Try from the present end of the flows (all the pieces of the starts)."""
@@ -100,6 +108,7 @@ class TailSearch:
         centre = self._floats.equilibrium(np.mean(ends, axis=0), keep)
         if centre is None:
             return TailFailure("no equilibrium was found near the end of the flowpipe")
+        self._tilt = self._moving(centre)
         slope = self._floats.jacobian(centre)[np.ix_(keep, keep)]
         if not np.isfinite(slope).all():
             return TailFailure("the Jacobian at the equilibrium is not finite")
@@ -117,7 +126,8 @@ class TailSearch:
             size = np.maximum(widest * 1.02, FLOOR * widest.max())
             if self.w_radius.any():
                 size = np.maximum(size, self._disturbed_size(np.asarray(np.linalg.inv(frame), float), slope, centre))
-            for growth in (1.0, 1.6):
+            # The ends of a class may be known in parts, more tightly than B as a whole will be.
+            for growth in (1.0, 1.6, 4.0) if self._tilt.any() else (1.0, 1.6):
                 axes = np.zeros((n, len(keep)))
                 axes[keep] = frame * (size * growth)
                 found = self._returns(centre, axes, flows, start, decay)
@@ -125,6 +135,45 @@ class TailSearch:
                     return found
                 reason = found.reason
         return TailFailure(reason)
+
+    def _moving(self, centre: Floats) -> Floats:
+        """How the equilibrium moves with the parameters of a class, (n, uncertain unknowns): secants through it."""
+        tilt = np.zeros((self.fld.states, len(self._whole.uncertain)))
+        for v, _ in parameters_of(self._whole):
+            k = v - self.chart.free
+            i = int(self._whole.uncertain[k])
+            ends = []
+            for value in (self.chart.unknown_lo[i], self.chart.unknown_hi[i]):
+                lo, hi = self.chart.unknown_lo.copy(), self.chart.unknown_hi.copy()
+                lo[i] = hi[i] = value
+                ends.append(self._loop(lo, hi).equilibrium(centre, self.states))
+            if ends[0] is not None and ends[1] is not None:
+                tilt[:, k] = 0.5 * (ends[1] - ends[0])
+        return tilt
+
+    def _from_centre(self, flow: Flow) -> tuple[Floats, Floats]:
+        """The end of a flow without what the centre of B moves by: (p, G) as in `half_widths`."""
+        p, G = flow.set_at(len(flow.steps))
+        if not self._tilt.any():
+            return p, G
+        p, n = p.copy(), self.fld.states
+        lost = np.zeros(n)
+        own = dict(parameters_of(flow.piece))
+        for v, number in parameters_of(self._whole):
+            tilt = self._tilt[:, v - self.chart.free]
+            middle, radius = scale_of(self._whole, v)
+            mine = next((u for u, k in own.items() if k == number), None)
+            if mine is None:
+                # Cut to a point, or nearly: what is left of its range is not known here.
+                return np.full_like(p, np.nan), G
+            c, r = scale_of(flow.piece, mine)
+            p[:, 0] -= tilt * ((c - middle) / radius)
+            p[:, flow.bounds.linear[mine]] -= tilt * (r / radius)
+            lost += np.abs(tilt) * (abs(c) + abs(middle) + r) / radius
+        lost = 16.0 * UNIT * (lost * (len(own) + 1) + np.abs(p).sum(axis=1)) + TINY
+        box = np.zeros((n, n, G.shape[2]))
+        box[np.arange(n), np.arange(n), 0] = lost
+        return p, np.concatenate([G, box])
 
     def _disturbed_size(self, inverse: Floats, slope: Floats, centre: Floats) -> Floats:
         """Float estimate of the ultimate bound under the disturbance, in the frame's coordinates."""
@@ -149,6 +198,8 @@ class TailSearch:
         if not all(inside):
             return TailFailure("the reach set is not inside the candidate set")
         chart = self.chart.around(centre, axes, self.chart.original)
+        if self._tilt.any():
+            chart = replace(chart, tilt=self._tilt)
         d = int((chart.unknown_lo < chart.unknown_hi).sum())
         piece = Piece(chart, -np.ones(k + d), np.ones(k + d))
         last = replace(self.fld, start=0.0)
@@ -167,7 +218,7 @@ class TailSearch:
 
     def _half_widths(self, flow: Flow, axes: Floats, centre: Floats) -> Floats:
         keep = self.states
-        p, G = flow.set_at(len(flow.steps))
+        p, G = self._from_centre(flow)
         return half_widths(flow.bounds, p[keep], G[:, keep], axes, centre[keep])
 
     def _inside(self, flow: Flow, axes: Floats, centre: Floats) -> bool:
