@@ -14,6 +14,9 @@ DROPPED = -2
 """Owners of a monomial of the Jacobian's table: kept, or of a degree that G and Psi do not carry;
 any other owner v means that the monomial holds the error variable of state v."""
 
+MOST_POWERS, NEGLIGIBLE = 200, 1e-18
+"""Powers of the Jacobian taken one by one: until the tail, in the infinity norm, is so small."""
+
 SIGMA_2 = 0.1284
 """int_0^1 |s^2/2 - 1/6| ds = 2 / (9 sqrt(3)) = 0.12830..., rounded up."""
 
@@ -71,19 +74,24 @@ def disturbance_columns(J, dJ, B, size_b, radius, Y, size_y, h, q, pairs, produc
         for i in range(n):
             largest = max(largest, h * size_b[i])
         # Third and higher powers entry by entry, int (1 - s)^k / k! ds = 1 / (k + 1)!; the tail beyond
-        # in the infinity norm, hence in every entry.
+        # in the infinity norm, hence in every entry. That norm knows no units: where those of the states
+        # differ it is far larger than the entries, so powers are taken until nothing is left to it.
         high = np.zeros(n)
-        power = Y2
-        factorial = 6.0
-        tail = size_y * size_y
-        for k in range(3, 11):
-            power = matrix_product(power, Y) * UP
-            factorial *= k + 1
-            tail *= size_y
+        power = h * size_b
+        tail = 1.0
+        k = 0
+        while k < MOST_POWERS and (k < 10 or tail > NEGLIGIBLE):
+            k += 1
+            following = np.full(n, TINY)
             for i in range(n):
                 for l in range(n):
-                    high[i] += power[i, l] * h * size_b[l] / factorial
-        rest = tail * size_y / (12.0 * factorial) * np.exp(size_y) * largest
+                    following[i] += Y[i, l] * power[l]
+            power = following * (UP / (k + 1))
+            tail *= size_y / (k + 1) * UP
+            if k > 2:
+                high += power
+        high *= UP
+        rest = tail * size_y / (k + 2) * np.exp(size_y) * UP * largest
         gamma = 1.01 * (2 * n * pairs + 3 * n + 16) * UNIT
         for i in range(n):
             s = rest + high[i]
