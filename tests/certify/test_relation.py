@@ -111,7 +111,7 @@ def swung() -> mg.ModeGraph:
 def test_cells_of_what_is_curved_hold_only_what_they_say(make: Any) -> None:
     graph = make()
     for i, j in (("first", "second"), ("second", "first")):
-        (relation,) = graph.references(i, j)._relations.values()
+        (relation,) = graph.references(i, j).relations.values()
         rng = np.random.default_rng(4)
         k = relation.source
         # Near the diagonal, where something is certified, and all over.

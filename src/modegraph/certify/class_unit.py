@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -31,9 +32,9 @@ from .unit import TargetSpec
 from .verdict import Floats, Status, Verdict
 
 MOST_PARTS = 32
+LEAST_DEGREE, MOST_MONOMIALS = 3, 400
+"""Of the polynomials in the search for an invariant set."""
 DEEPEST = 7
-LEAST_PATIENCE = 1.0
-"""Seconds for smaller parts, if the first answer took less."""
 PROGRESS = 1.05
 """A cut must carry the constraints this much further, or it is the last one."""
 
@@ -67,18 +68,17 @@ def relate(
     ----------
     horizon : seconds a switch may take; None: the duration of the reference and some more.
     thorough : smaller parts of the starts are tried until the deadline, as long as they certify more
-        references; by default for as long again as the first answer took.
+        references.
     """
     compiled = compile_mode(mode, p)
     end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
-    begun = time.monotonic()
     chains = _legal_chains(compiled, end, deadline, progress)
     region = mode.reference.region if p is None else None
     rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None
     goals = [_goal(spec, compiled.plant) for spec in targets]
     links = Links(compiled, region, [goal for goal in goals if isinstance(goal, TargetClass)], rest, end, chains)
-    now = time.monotonic()
-    links.refine(deadline if thorough else min(deadline, now + max(LEAST_PATIENCE, now - begun)), progress)
+    if thorough:
+        links.refine(deadline, progress)
     known = iter(links.relations)
     relations = [goal if isinstance(goal, str) else next(known) for goal in goals]
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
@@ -184,7 +184,7 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         flow = chain.flows[-1]
         if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
             return TailFailure("the flowpipe ends before the loop has settled")
-        order = Order(1, 0) if compiled.linear else chain.order
+        order = Order(1, 0) if compiled.linear else _tail_order(chain)
         search = TailSearch(
             flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
         )
@@ -202,6 +202,14 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         np.max([tail.hi for tail in found], axis=0),
         min(tail.decay for tail in found),
     )
+
+
+def _tail_order(chain: Chain) -> Order:
+    """As high a degree as the flow has, within a size; a candidate set may have fewer variables, so no weights."""
+    degree = chain.order.degree
+    while degree > LEAST_DEGREE and math.comb(chain.piece.variables + degree, degree) > MOST_MONOMIALS:
+        degree -= 1
+    return Order(degree, min(degree - 1, chain.order.jacobian))
 
 
 def _own_chart(piece: Piece) -> Chart:

@@ -114,10 +114,12 @@ def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int)
         lo[k], hi[k] = flow.piece.unknown_range(int(flow.piece.uncertain[v - flow.piece.chart.free]))
         middle[k], scale[k] = scale_of(flow.piece, v)
         powers[:, k] = exponents[pure, v]
+    rows = np.einsum("fi,kij->kfj", target.rows, p[:, :, pure])
+    used = rows.any(axis=(0, 1)) | (powers.sum(axis=1) == 0)
     return Moments(
         lo, hi, all(flow.piece.lo[v] == -1.0 and flow.piece.hi[v] == 1.0 for v, _ in own),
-        flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers,
-        np.einsum("fi,kij->kfj", target.rows, p[:, :, pure]),
+        flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers[used],
+        np.ascontiguousarray(rows[:, :, used]),
         np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(flow, target, rest, G),
         float(np.abs(p).sum(axis=2).max() + max(np.abs(g).sum() for g in G)),
     )  # fmt: skip

@@ -114,6 +114,12 @@ class Relation:
         limits = np.maximum(self.goal.at(self.goal.middle)[2][0], 1e-12)
         return (y - self.goal.rows @ c0) / limits, Y / limits[:, None], self.goal.rows @ C / limits[:, None]
 
+    @cached_property
+    def stays(self) -> bool:
+        """Of a class to itself: the mode ends where it starts, as at a set-point; else it carries the state along."""
+        _, Y, Z = self.arrival
+        return bool(np.abs(Y - Z).max(initial=0.0) <= 0.05 * np.abs(Z).max(initial=0.0))
+
     def crossings(self, source: Floats, target: Floats, quick: bool = False) -> Crossings:
         """Decide pairs: source (B, ki) and target (B, kj) references; outside their classes nothing is certified.
 
