@@ -12,7 +12,7 @@ from ..reach.flow import Flow
 from ..reach.framing import generator_box
 from .proof import least_slack
 from .samples import sample_powers
-from .verdict import Widths
+from .verdict import Unproved, Widths
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,20 @@ def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
     for name, value in zip(names, upper, strict=True):
         out[name] = min(-float(value), out.get(name, np.inf))
     return out
+
+
+def unproved(flow: Flow, proved: int) -> Unproved | None:
+    """The constraint that is not proved on the step after instant ``proved`` (-1: at the start)."""
+    if proved < 0:
+        upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+        names, when = flow.fields[flow.first_segment].faces, float(flow.times[0])
+    else:
+        step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
+        upper, names, when = step.face_upper, flow.fields[step.segment].faces, step.start
+    if not len(upper):
+        return None
+    k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
+    return Unproved(names[k], when, float(upper[k]))
 
 
 def width_over_time(flows: Sequence[Flow]) -> Widths | None:
