@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model.sets import Ball, Ellipsoid, Sublevel
+from ..reach.framing import generator_box
 from .crossing import Nearest
 from .region import Region
 from .verdict import Approach, Floats
@@ -21,7 +22,21 @@ def approach_of(nearest: Nearest | None, region: Region, names: Sequence[str]) -
     if not np.isfinite(missing):
         return None
     words, unit, scale = face_in_words(region, face, names)
-    return Approach(nearest.time, nearest.gauge, words, missing * scale, unit)
+    return Approach(nearest.time, nearest.gauge, words, missing * scale, unit, _farthest(nearest, region, names))
+
+
+def _farthest(nearest: Nearest, region: Region, names: Sequence[str]) -> str:
+    """In which state a set is farthest from the centre of a round target."""
+    target, n = region.set, region.dim
+    if not isinstance(target, Ball | Ellipsoid):
+        return ""
+    lo, hi = nearest.bounds.ranges(nearest.p[:n])
+    spread = generator_box(nearest.G[:, :n]) + nearest.lost[:n]
+    c = np.asarray(target.c, float)
+    out = np.maximum(hi + spread - c, c - lo + spread)
+    allowed = np.full(n, target.radius) if isinstance(target, Ball) else np.sqrt(np.diag(np.asarray(target.shape)))
+    k = int(np.argmax(out / np.maximum(allowed, 1e-300)))
+    return f"{names[k]} up to {out[k]:.4g} from its centre, where {allowed[k]:.4g} is allowed"
 
 
 def face_in_words(region: Region, face: int, names: Sequence[str]) -> tuple[str, str, float]:

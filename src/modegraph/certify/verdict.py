@@ -86,6 +86,8 @@ class Approach:
         How far beyond that face the set reaches, in ``unit``; negative: the room that is left.
     unit : str
         What ``missing`` is measured in: a state, a combination of states, "distance", ...
+    detail : str
+        For a round target, the state in which the set is farthest out, relative to the size of the target.
     start : (n,) array or None
         The worst start.
     origin : {"sampled", "middle", "witness", ""}
@@ -98,6 +100,7 @@ class Approach:
     face: str
     missing: float
     unit: str
+    detail: str = ""
     start: Floats | None = None
     origin: Literal["sampled", "middle", "witness", ""] = ""
 
