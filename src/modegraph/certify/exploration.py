@@ -73,7 +73,10 @@ class Exploration:
         stops: Sequence[float],
         deadline: float,
         tick: Callable[[str], None],
+        until: float = np.inf,
     ) -> None:
+        """``until``: seconds after which nothing is looked at, the steps being those of the horizon."""
+        self.until = until
         self.fields, self.framed, self.goals, self.plant = fields, framed, goals, plant
         self.w_centre, self.w_radius = w
         self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
@@ -240,7 +243,7 @@ class Exploration:
         return found
 
     def _end(self) -> float:
-        return LONGEST if self.horizon is None else self.horizon
+        return min(self.until, LONGEST if self.horizon is None else self.horizon)
 
     def _advance(
         self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool

@@ -66,6 +66,7 @@ def certify_unit(
     deadline: float,
     progress: Callable[[str], None] | None = None,
     switches_only: bool = False,
+    until: float = np.inf,
 ) -> UnitResult:
     """Decide condition (C) for every target, and Assumption 1, from the flowpipe of one mode.
 
@@ -75,10 +76,11 @@ def certify_unit(
     deadline : instant of ``time.monotonic()`` after which what is not decided is UNDECIDED.
     switches_only : look for proofs of switches alone, not for that of Assumption 1 nor for counterexamples
         (but for equilibria, which cost nothing).
+    until : seconds after which no proof of a switch is looked for, for a quick answer.
     """
     compiled = compile_mode(mode, p)
     tick = progress or (lambda text: None)
-    return _Unit(mode, p, compiled, targets, horizon, deadline, tick, switches_only).run()
+    return _Unit(mode, p, compiled, targets, horizon, deadline, tick, switches_only, until).run()
 
 
 def exploration_of(
@@ -87,6 +89,7 @@ def exploration_of(
     horizon: float | None,
     deadline: float,
     tick: Callable[[str], None],
+    until: float = np.inf,
 ) -> Exploration:
     """The exploration of a compiled mode."""
     return Exploration(
@@ -101,6 +104,7 @@ def exploration_of(
         stops=compiled.stops,
         deadline=deadline,
         tick=tick,
+        until=until,
     )
 
 
@@ -127,7 +131,9 @@ class _Unit:
         deadline: float,
         tick: Callable[[str], None],
         switches_only: bool,
+        until: float,
     ) -> None:
+        self.until = until
         self.mode, self.p, self.compiled, self.switches_only = mode, p, compiled, switches_only
         self.targets, self.horizon, self.deadline, self.tick = targets, horizon, deadline, tick
         self.verdicts: dict[int, Verdict] = {}
@@ -155,7 +161,7 @@ class _Unit:
 
     def _prove(self) -> None:
         compiled = self.compiled
-        exploration = exploration_of(compiled, dict(self.goals), self.horizon, self.deadline, self.tick)
+        exploration = exploration_of(compiled, dict(self.goals), self.horizon, self.deadline, self.tick, self.until)
         self._switches_in_zero_time()
         scene = scene_of(self.mode, self.compiled)
         self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])

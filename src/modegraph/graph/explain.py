@@ -28,7 +28,8 @@ def explained(graph: ModeGraph, i: str, j: str, verdict: Verdict, r_i: Any, r_j:
     case = graph.deciding(i, j, r_i, r_j)
     if case is not None:
         told = _Explainer(graph, told, *case, time.monotonic() + float(seconds)).run()
-    return replace(told, text=explanation_text(told))
+    several = graph.has_choice(i) or graph.has_choice(j)
+    return replace(told, text=explanation_text(told, several))
 
 
 class _Explainer:
@@ -95,7 +96,7 @@ class _Explainer:
         if self._is_over:
             self._note("no repair was tried: no time was allowed")
             return
-        search = RepairSearch(self.pair, None, self.end)
+        search = RepairSearch(self.pair, self.end)
         try:
             if self.told.reach is None:
                 again = search.as_it_is(self.classes)
@@ -104,8 +105,10 @@ class _Explainer:
                 self.unproved = self.unproved or again.unproved
                 self._reached(again.closest)
             self._blame()
-            search.gauge = None if self.told.reach is None else self.told.reach.gauge
-            search.longer(self._is_late)
+            search.reach = self.told.reach
+            search.gauge = None if self.told.closest is None else self.told.closest.gauge
+            if self._is_late:
+                search.longer()
             search.larger()
             search.smaller()
         finally:

@@ -101,10 +101,10 @@ class Explanation:
         return self.text
 
 
-def explanation_text(e: Explanation) -> str:
-    """The explanation for a person."""
+def explanation_text(e: Explanation, several: bool) -> str:
+    """The explanation for a person; ``several``: the modes have other references too."""
     lines = _verdict_lines(e.source, e.target, e.verdict)
-    if e.verdict.status is not Status.CERTIFIED and (e.r_i is not None or e.r_j is not None):
+    if several and (e.r_i is not None or e.r_j is not None):
         lines.append(f"  told of the references {parameter_text(e.r_i)} to {parameter_text(e.r_j)}")
     lines += _approach_lines(e)
     if e.repairs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from modegraph.certify.references import Parameter
@@ -9,6 +10,7 @@ from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Verdict
 from modegraph.cores import one_core
 from modegraph.model.mode import Mode
+from modegraph.model.sets import Set, Sublevel, is_subset
 from modegraph.model.sets.scaled import scaled
 from modegraph.model.start import mode_start
 from modegraph.model.target import Target
@@ -73,9 +75,7 @@ class Pair:
 
     def grown(self, factor: float) -> Pair:
         """With the set to be entered scaled about its centre."""
-        target = self.target
-        entered = target.set if isinstance(target, Target) else mode_start(target, self.r_j)
-        return self._with(None, with_set(target, self.r_j, scaled(entered, factor)))
+        return self._with(None, with_set(self.target, self.r_j, scaled(self.entered, factor)))
 
     def lasting(self, seconds: float | None) -> Pair:
         """With another horizon."""
@@ -88,15 +88,29 @@ class Pair:
     # -- proofs ----------------------------------------------------------------------------------
 
     @property
+    def entered(self) -> Set:
+        """The set the switch leads into."""
+        return self.target.set if isinstance(self.target, Target) else mode_start(self.target, self.r_j)
+
+    @property
+    def starts_inside(self) -> bool:
+        """Whether all starts of the source are in the target already, decided exactly; False where that is costly."""
+        start, entered = mode_start(self.source, self.r_i), self.entered
+        if isinstance(start, Sublevel) or isinstance(entered, Sublevel) or start.dim != entered.dim:
+            return False
+        return is_subset(start, entered)
+
+    @property
     def spec(self) -> TargetSpec:
         return TargetSpec(self.target.name, self.r_j, self.target)
 
-    def proved(self, deadline: float) -> Verdict:
-        """The verdict on this pair alone, without a search for counterexamples."""
+    def proved(self, deadline: float, until: float = math.inf) -> Verdict:
+        """The verdict on this pair alone, without a search for counterexamples, nor for switches after ``until``."""
         with one_core():
             found = certify_unit(
-                self.source, self.r_i, [self.spec], horizon=self.source.horizon, deadline=deadline, switches_only=True
-            )
+                self.source, self.r_i, [self.spec],
+                horizon=self.source.horizon, deadline=deadline, switches_only=True, until=until,
+            )  # fmt: skip
         return found.verdicts[0]
 
     def built(self, deadline: float) -> Verdict:

@@ -8,18 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from modegraph.certify.verdict import Status, Verdict
+from modegraph.certify.verdict import Approach, Status, Verdict
 from modegraph.errors import ModegraphError
 from modegraph.graph.pair import Pair
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 
 Kind = Literal["fix references", "horizon", "grow target", "shrink start"]
+Change = Callable[[float], Pair]
 
 SMALLEST, LARGEST = 1e-3, 1e3
 """Least scale of the starts, and largest growth of the target, that are tried."""
 PRECISION = 1.005
-"""A search ends when the next value by this factor is not proved."""
+"""A search ends when a value this near to a proved one was missed."""
 BACK_OFF = 1.02
 """Towards the safe side, where ``build`` does not find what the search has proved."""
 DIGITS = 4
@@ -29,6 +30,8 @@ LONGER = (4.0, 16.0)
 """Multiples of the horizon that are tried."""
 LATE = 0.75
 """A longer horizon may help where the approach is closest after this part of it."""
+SOON = 0.25
+"""Tries look no further than twice the time of the closest approach, or this part of the horizon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +44,21 @@ class Repair:
     value : float
         The scale of the starts or of the target about their centre, the horizon in seconds, or 1. It has few
         digits: the printed number is the one that was proved.
+    missed : float or None
+        The nearest value that was tried and not proved; None where none was.
     text : str
     verdict : Verdict
         Of the pair, certified.
     modes : tuple of Mode and Target
-        The modes of the graph with the change made: pass them to ``build``.
+        The modes of the graph with the change made: pass them to ``build``. A mode that is entered is also a
+        mode that runs: the switches out of it are proved anew from its new starts.
     source, target : Mode, Mode or Target
         The two of them that the switch is between.
     """
 
     kind: Kind
     value: float
+    missed: float | None
     text: str
     verdict: Verdict
     modes: tuple[Mode | Target, ...]
@@ -62,6 +69,32 @@ class Repair:
         return self.text
 
 
+@dataclass(frozen=True)
+class _Bracket:
+    """A proved value and the nearest missed one, with their margins; ``tried``: the missed one was examined."""
+
+    good: float
+    bad: float
+    margin: float | None = None
+    missing: float | None = None
+    tried: bool = False
+
+    @property
+    def ratio(self) -> float:
+        return max(self.good / self.bad, self.bad / self.good)
+
+    def zero(self) -> float | None:
+        """A little before a margin that is linear in the value becomes zero."""
+        if self.margin is None or self.missing is None or not self.missing < 0.0 < self.margin < math.inf:
+            return None
+        return self.good + 0.999 * (self.bad - self.good) * self.margin / (self.margin - self.missing)
+
+    def after(self, value: float, verdict: Verdict) -> _Bracket:
+        if verdict.status is Status.CERTIFIED:
+            return _Bracket(value, self.bad, verdict.margin, self.missing, self.tried)
+        return _Bracket(self.good, value, self.margin, verdict.margin, True)
+
+
 @dataclass
 class RepairSearch:
     """Looks for repairs of an absent switch until an instant of ``time.monotonic()``.
@@ -69,19 +102,26 @@ class RepairSearch:
     Attributes
     ----------
     pair : Pair
-    gauge : float or None
-        How near the starts come to the target as it is, at most 1 inside it.
     end : float
+    reach : Approach or None
+        How near all that the worst part of the starts can reach comes to the target, as it is.
+    gauge : float or None
+        How near some start comes at best, where more is not known.
     found : list of Repair
     notes : list of str
         What was not found, and why.
     """
 
     pair: Pair
-    gauge: float | None
     end: float
+    reach: Approach | None = None
+    gauge: float | None = None
     found: list[Repair] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    _cut: bool = False
+    """The last try was ended by its deadline."""
+    _reserve: float = 0.0
+    """Seconds that the unit of ``build`` took."""
 
     # -- kinds -----------------------------------------------------------------------------------
 
@@ -90,65 +130,73 @@ class RepairSearch:
         verdict = self._proved(self.pair, 0.3)
         if verdict.status is Status.CERTIFIED and classes:
             text = "list these references with mg.Points: for them alone the switch is certified"
-            self._tell("fix references", lambda v: self.pair, 1.0, 1.0, lambda v: text)
+            self._tell("fix references", lambda v: self.pair, 1.0, None, 1.0, lambda v: text)
         elif verdict.status is Status.CERTIFIED:
-            self.notes.append(
-                "examined by itself, with more time, the switch is certified: give build a larger budget="
-            )
+            self.notes.append("examined by itself the switch is certified: a larger budget= of build may give it")
         return verdict
 
-    def longer(self, late: bool) -> None:
-        """The shortest horizon; ``late``: the approach was closest near the end of the present one."""
+    def longer(self) -> None:
+        """The shortest horizon."""
         now = self.pair.source.horizon
-        if now is None or not late:
+        if now is None:
             return
         for multiple in LONGER:
             verdict = self._proved(self.pair.lasting(multiple * now), 0.3)
             if verdict.time is not None:
                 break
         else:
-            self.notes.append(f"horizon: no switch was proved within {LONGER[-1] * now:g} s either{self._late()}")
+            self._missing("horizon", f"no switch was proved within {LONGER[-1] * now:g} s either")
             return
         good = rounded(verdict.time[1] * (1.0 + 1e-9), up=True)
         if self._proved(self.pair.lasting(good), 0.3).status is not Status.CERTIFIED:
             good = rounded(multiple * now, up=True)
-        good = self._narrowed(self.pair.lasting, good, now)
-        self._tell("horizon", self.pair.lasting, good, BACK_OFF, lambda v: f"a horizon of {v:g} s")
+        found = self._narrowed(self.pair.lasting, _Bracket(good, now, tried=True))
+        self._tell("horizon", self.pair.lasting, *found, BACK_OFF, lambda v: f"a horizon of {v:g} s")
 
     def larger(self) -> None:
         """The smallest growth of the target."""
-        bad, verdict, gauge = 1.0, None, self.gauge
-        while bad < LARGEST and not self._is_over:
-            factor = rounded(bad * max(1.0005, 1.0002 * (2.0 if gauge is None else gauge)), up=True)
-            verdict = self._proved(self.pair.grown(factor), 0.4)
+        change = self.pair.grown
+        bad, tried = 1.0, True
+        gauge = self.gauge if self.reach is None else self.reach.gauge
+        factor = rounded(2.0 if gauge is None else max(1.0005, 1.0002 * gauge), up=True)
+        inside = self._nested(self.pair.grown, LARGEST, 1.0)
+        limit = LARGEST if inside is None else inside
+        while factor < limit and not self._is_over:
+            verdict = self._proved(change(factor), 0.4)
             if verdict.status is Status.CERTIFIED:
                 break
-            bad, gauge = factor, max(1.02, _gauge_of(verdict) or 2.0)
-        if verdict is None or verdict.status is not Status.CERTIFIED:
-            self.notes.append(f"grow target: nothing was proved up to {bad:g} times its size{self._late()}")
-            return
-        good = self._narrowed(self.pair.grown, factor, bad)
+            bad, tried = factor, True
+            gauge = 2.0 if verdict.closest is None or self._cut else verdict.closest.gauge
+            factor = rounded(factor * max(1.02, 1.0002 * gauge), up=True)
+        else:
+            if inside is None:
+                self._missing("grow target", f"nothing was proved up to {bad:g} times its size")
+                return
+            factor = inside
+        found = self._narrowed(change, _Bracket(factor, bad, tried=tried))
         name = self.pair.target.name
         what = "the set" if isinstance(self.pair.target, Target) else "the starts"
-        self._tell("grow target", self.pair.grown, good, BACK_OFF, lambda v: f"{what} of {name!r} {v:g} times as large")
+        self._tell(
+            "grow target", self.pair.grown, *found, BACK_OFF, lambda v: f"{what} of {name!r} {v:g} times as large"
+        )
 
     def smaller(self) -> None:
         """The largest scale of the starts."""
-        least = self._proved(self.pair.shrunk(SMALLEST), 0.4)
-        if least.status is not Status.CERTIFIED:
-            self.notes.append(
-                f"shrink start: not even {SMALLEST:g} times the starts of {self.pair.source.name!r} would do"
-                + (f": {least.reason}" if least.reason else "")
-                + self._late()
-            )
-            return
-        missing = None if self.gauge is None else 1.0 - self.gauge
-        known = least.margin is not None and missing is not None and missing < 0.0 <= least.margin < math.inf
-        margins = (least.margin, missing) if known and least.margin is not None and missing is not None else None
-        good = self._narrowed(self.pair.shrunk, SMALLEST, 1.0, margins)
+        change = self.pair.shrunk
         name = self.pair.source.name
+        inside = self._nested(self.pair.shrunk, SMALLEST, 1.0)
+        least = SMALLEST if inside is None else inside
+        verdict = self._proved(change(least), 0.4)
+        if verdict.status is not Status.CERTIFIED:
+            why = "that was not decided" if self._cut else verdict.reason.partition("; ")[0]
+            self._missing("shrink start", f"not even {least:g} times the starts of {name!r} would do: {why}")
+            return
+        # A switch in zero time says nothing of how near larger starts come.
+        margin = verdict.margin if inside is None else None
+        bracket = _Bracket(least, 1.0, margin, None if self.reach is None else 1.0 - self.reach.gauge, True)
+        found = self._narrowed(change, bracket)
         self._tell(
-            "shrink start", self.pair.shrunk, good, 1.0 / BACK_OFF, lambda v: f"{v:g} times the starts of {name!r}"
+            "shrink start", self.pair.shrunk, *found, 1.0 / BACK_OFF, lambda v: f"{v:g} times the starts of {name!r}"
         )
 
     # -- search ----------------------------------------------------------------------------------
@@ -157,62 +205,82 @@ class RepairSearch:
     def _is_over(self) -> bool:
         return time.monotonic() >= self.end
 
-    def _late(self) -> str:
-        return " (the time allowed is over)" if self._is_over else ""
+    def _missing(self, kind: Kind, why: str) -> None:
+        self.notes.append(f"{kind}: {why}" + (" (the time allowed is over)" if self._is_over else ""))
+
+    @property
+    def _until(self) -> float:
+        """Seconds after which tries look for nothing."""
+        horizon = self.pair.source.horizon
+        return math.inf if horizon is None or self.reach is None else max(2.0 * self.reach.time, SOON * horizon)
 
     def _proved(self, pair: Pair, share: float) -> Verdict:
         """The verdict on a changed pair, within a share of the time that is left."""
         now = time.monotonic()
-        return attempt(lambda: pair.proved(now + share * max(0.0, self.end - now)))
+        deadline = now + share * max(0.0, self.end - self._reserve - now)
+        until = self._until if pair.source.horizon == self.pair.source.horizon else math.inf
+        verdict = attempt(lambda: pair.proved(deadline, until))
+        self._cut = time.monotonic() > deadline
+        return verdict
 
-    def _narrowed(
-        self, change: Callable[[float], Pair], good: float, bad: float, margins: tuple[float, float] | None = None
-    ) -> float:
-        """The proved value nearest to ``bad``, from a proved and a missed one and, if known, their margins.
+    def _nested(self, change: Change, good: float, bad: float) -> float | None:
+        """The value nearest to ``bad`` for which all starts are in the target already; None where there is none."""
+        up = bad < good
+        try:
+            if not change(good).starts_inside:
+                return None
+            while max(good / bad, bad / good) > 1.0002 and not self._is_over:
+                value = rounded(math.sqrt(good * bad), up)
+                if not min(good, bad) < value < max(good, bad):
+                    break
+                good, bad = (value, bad) if change(value).starts_inside else (good, value)
+        except ModegraphError:
+            return None
+        return good
+
+    def _narrowed(self, change: Change, bracket: _Bracket) -> tuple[float, float | None]:
+        """The proved value nearest to the missed one that was found in half of the time left, and the missed one.
 
         Without margins the proved value is itself a good guess: its neighbour is tried first.
         """
-        up = bad < good
-        half = time.monotonic() + 0.5 * (self.end - time.monotonic())
-        look_next_door = margins is None
+        up = bracket.bad < bracket.good
+        half = time.monotonic() + 0.5 * (self.end - self._reserve - time.monotonic())
+        next_door = bracket.zero() is None
         for k in range(MOST_TRIES):
-            if max(good / bad, bad / good) <= PRECISION or time.monotonic() > half:
+            if bracket.ratio <= PRECISION or time.monotonic() > half:
                 break
-            guessed = False
-            if look_next_door:
-                value = good / PRECISION if up else good * PRECISION
-            elif margins is not None and k % 2 == 0:
-                value, guessed = _zero(good, bad, *margins), True
-            else:
-                value = math.sqrt(good * bad)
+            guess = bracket.zero() if k % 2 == 0 else None
+            value = guess or math.sqrt(bracket.good * bracket.bad)
+            if next_door:
+                value = bracket.good / PRECISION if up else bracket.good * PRECISION
             value = rounded(value, up)
-            if not min(good, bad) < value < max(good, bad):
+            if not min(bracket.good, bracket.bad) < value < max(bracket.good, bracket.bad):
                 break
             verdict = self._proved(change(value), 0.3)
-            proved = verdict.status is Status.CERTIFIED
-            look_next_door = guessed and proved
-            good, bad = (value, bad) if proved else (good, value)
-            if margins is not None:
-                margins = _with(margins, verdict, proved)
-        return good
+            next_door = guess is not None and not next_door and verdict.status is Status.CERTIFIED
+            bracket = bracket.after(value, verdict)
+        return bracket.good, bracket.bad if bracket.tried else None
 
     def _tell(
-        self, kind: Kind, change: Callable[[float], Pair], value: float, back: float, text: Callable[[float], str]
+        self, kind: Kind, change: Change, value: float, missed: float | None, back: float, text: Callable[[float], str]
     ) -> None:
         """Have the value confirmed by the unit that ``build`` does, and tell it."""
         for _ in range(2):
             pair = change(value)
+            now = time.monotonic()
             verdict = attempt(lambda pair=pair: pair.built(self.end))  # type: ignore[misc]
+            self._reserve = max(self._reserve, time.monotonic() - now)
             if verdict.status is Status.CERTIFIED:
-                told = f"{text(value)}: {verdict.reason}"
-                self.found.append(Repair(kind, value, told, verdict, pair.modes, pair.source, pair.target))
+                tried = (
+                    "" if missed is None or missed in (1.0, self.pair.source.horizon) else f" ({missed:g}: not proved)"
+                )
+                told = f"{text(value)}{tried}: {verdict.reason}"
+                self.found.append(Repair(kind, value, missed, told, verdict, pair.modes, pair.source, pair.target))
                 return
             if self._is_over or back == 1.0:
                 break
             value = rounded(value * back, up=back > 1.0)
-        self.notes.append(
-            f"{kind}: {value:g} was proved for the pair, but not by a whole build of the changed modes{self._late()}"
-        )
+        self._missing(kind, f"{value:g} was proved for the pair, but not by a whole build of the changed modes")
 
 
 def attempt(prove: Callable[[], Verdict]) -> Verdict:
@@ -232,20 +300,3 @@ def rounded(value: float, up: bool) -> float:
     if (near >= value) == up or near == value:
         return near
     return float(f"{near + (unit if up else -unit):.{DIGITS}g}")
-
-
-def _zero(good: float, bad: float, margin: float, missing: float) -> float:
-    """Where a margin that is linear in the value becomes zero, and a little less."""
-    return good + (bad - good) * margin / (margin - missing) * 0.999
-
-
-def _with(margins: tuple[float, float], verdict: Verdict, proved: bool) -> tuple[float, float] | None:
-    """The margins of the proved and the missed value, one of them new; None where it has none."""
-    new = verdict.margin
-    if new is None or not math.isfinite(new) or (new >= 0.0) != proved:
-        return None
-    return (new, margins[1]) if proved else (margins[0], new)
-
-
-def _gauge_of(verdict: Verdict) -> float | None:
-    return None if verdict.closest is None else verdict.closest.gauge
