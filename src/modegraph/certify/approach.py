@@ -51,7 +51,7 @@ def face_in_words(region: Region, face: int, names: Sequence[str]) -> tuple[str,
         if len(used) == 1:
             k = int(used[0])
             a, name = float(row[k]), names[k]
-            return f"{name} {'<=' if a > 0.0 else '>='} {bound / a:.6g}", name, 1.0 / abs(a)
+            return f"{name} {'<=' if a > 0.0 else '>='} {bound / a + 0.0:.6g}", name, 1.0 / abs(a)
         combination = _sum([(float(row[k]), names[k]) for k in used.tolist()])
         return f"{combination} <= {bound:.6g}", combination, 1.0
     if isinstance(target, Sublevel):

@@ -25,7 +25,7 @@ BACK_OFF = 1.02
 """Towards the safe side, where ``build`` does not find what the search has proved."""
 DIGITS = 4
 """Of the values tried: what is printed is exactly what was proved."""
-MOST_TRIES = 16
+MOST_TRIES, MOST_GUESSES = 20, 3
 LONGER = (4.0, 16.0)
 """Multiples of the horizon that are tried."""
 LATE = 0.75
@@ -188,8 +188,9 @@ class RepairSearch:
         least = SMALLEST if inside is None else inside
         verdict = self._proved(change(least), 0.4)
         if verdict.status is not Status.CERTIFIED:
-            why = "that was not decided" if self._cut else verdict.reason.partition("; ")[0]
-            self._missing("shrink start", f"not even {least:g} times the starts of {name!r} would do: {why}")
+            starts = f"{least:g} times the starts of {name!r}"
+            why = f"not even {starts} would do: {verdict.reason.partition('; ')[0]}"
+            self._missing("shrink start", f"{starts} were not decided in time" if self._cut else why)
             return
         # A switch in zero time says nothing of how near larger starts come.
         margin = verdict.margin if inside is None else None
@@ -241,18 +242,23 @@ class RepairSearch:
     def _narrowed(self, change: Change, bracket: _Bracket) -> tuple[float, float | None]:
         """The proved value nearest to the missed one that was found in half of the time left, and the missed one.
 
-        Without margins the proved value is itself a good guess: its neighbour is tried first.
+        The first values are where the margins say it ends; without margins that is the proved value itself. Where
+        the neighbour of such a guess is proved as well, margins say nothing, and the search goes on by bisection.
         """
         up = bracket.bad < bracket.good
         half = time.monotonic() + 0.5 * (self.end - self._reserve - time.monotonic())
+        guesses = MOST_GUESSES
         next_door = bracket.zero() is None
-        for k in range(MOST_TRIES):
+        for _ in range(MOST_TRIES):
             if bracket.ratio <= PRECISION or time.monotonic() > half:
                 break
-            guess = bracket.zero() if k % 2 == 0 else None
-            value = guess or math.sqrt(bracket.good * bracket.bad)
+            guess = bracket.zero() if guesses else None
             if next_door:
                 value = bracket.good / PRECISION if up else bracket.good * PRECISION
+                guesses = 0
+            else:
+                value = guess or math.sqrt(bracket.good * bracket.bad)
+                guesses = max(0, guesses - 1)
             value = rounded(value, up)
             if not min(bracket.good, bracket.bad) < value < max(bracket.good, bracket.bad):
                 break
