@@ -99,8 +99,8 @@ ENGINE_FAULTS = (
     Fault(
         "a target holds the polynomial without its generators",
         "certify/region.py",
-        "            reach = bounds.upper(q) + spread\n",
-        "            reach = bounds.upper(q)\n",
+        "        reach = bounds.upper(q) + spread\n",
+        "        reach = bounds.upper(q)\n",
         ("tests/certify/test_region.py",),
     ),
     Fault(
