@@ -102,6 +102,21 @@ def test_an_equilibrium_outside() -> None:
         assert part in text
 
 
+def test_an_unstable_equilibrium_is_looked_at_where_it_is() -> None:
+    """1/3 is no double: from the double beside it the loop leaves, and passes the target."""
+    plant = mg.System(lambda x, u: u, states="x", inputs="u")
+    mode = mg.Mode(
+        "flee", plant, controller=lambda x: 3.0 * x - 1.0, reference=mg.setpoint([0.0]), start=mg.Box([0.3], [0.4])
+    )
+    told = mg.build([mode, mg.Target("there", mg.Box([-9.0], [0.2]))], horizon=30.0).explain("flee", "there")
+    assert told.verdict.status is mg.Status.REFUTED
+    assert told.closest is not None
+    if told.verdict.witness is not None and told.verdict.witness.time == 0.0:
+        assert told.closest.time == 0.0
+    assert told.closest.gauge > 1.0
+    assert told.missing == pytest.approx(1.0 / 3.0 - 0.2)
+
+
 def test_a_disturbance_that_keeps_starts_out() -> None:
     """|w| <= .2 holds a start at .2: the target must be twice as large, or all starts inside from the beginning."""
     told = mg.build([decay(mg.Box([-1.0], [1.0]), push=0.2), home()], horizon=9.0).explain("decay", "home")
@@ -297,6 +312,9 @@ def test_without_time_the_rest_is_told() -> None:
     assert told.repairs == ()
     assert told.worst_start is not None
     assert any("no time was allowed" in note for note in told.notes)
+    assert told.blocking == "x <= 0.1"
+    broken = mg.build([drift(lambda x: {"wall": x[0] <= 1.0}), mg.Target("t", mg.Box([1.5], [2.5]))], horizon=5.0)
+    assert broken.explain("drift", "t", seconds=0.0).blocking == "constraint 'wall'"
     for wrong in (-1.0, math.nan, True, "long"):
         with pytest.raises(mg.ModegraphError, match="seconds"):
             graph.explain("decay", "home", seconds=wrong)  # type: ignore[arg-type]

@@ -28,6 +28,8 @@ def witnessed(
     """How near the trajectory of a witness comes to the target, and which constraint it violates.
 
     The trajectory is validated; it is looked at at the ends of its steps, as long as no constraint is violated.
+    Where it cannot be followed for as long as the witness says, nothing is told. An equilibrium is looked at
+    where it is: that of a start beside it may go anywhere.
 
     Parameters
     ----------
@@ -38,9 +40,11 @@ def witnessed(
     scene = scene_of(mode, compiled)
     goal = goal_of(spec, compiled.plant)
     end = LONG + 2.0 * witness.time if horizon is None else horizon
+    if witness.kind == "trapped" and witness.time == 0.0:
+        end = 0.0
     w = np.clip(np.zeros(len(scene.w_lo)), scene.w_lo, scene.w_hi) if witness.w is None else np.asarray(witness.w)
     d = np.array([witness.d.get(name, middle) for name, middle in zip(scene.unknowns, scene.constants(), strict=True)])
-    run = PointRun(scene, np.asarray(witness.x0, float), w, d, end / LOOKS)
+    run = PointRun(scene, np.asarray(witness.x0, float), w, d, end / LOOKS if end else np.inf)
     steps = 0
     while run.violation is None and run.flow.time < end and steps < POINT_STEPS and time.monotonic() < deadline:
         steps += 50
@@ -49,6 +53,8 @@ def witnessed(
         if run.flow.time == before:
             break
     reach = Reach(run.flow, end, goal.reset)
+    if run.violation is None and run.flow.time < witness.time:
+        return None, None
     if reach.usable < 0:
         return None, run.breach()
     region = goal.region

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from modegraph.graph.modegraph import ModeGraph
 
 
+WITNESS_SECONDS = 5.0
+"""For following the trajectory of a counterexample, which takes much less as a rule, whatever time is allowed."""
+
+
 def explained(graph: ModeGraph, i: str, j: str, verdict: Verdict, r_i: Any, r_j: Any, seconds: float) -> Explanation:
     """The explanation of a verdict; whatever is known when the time is over, or at an interrupt, is told."""
     if isinstance(seconds, bool) or not isinstance(seconds, Real) or not 0 <= seconds < math.inf:
@@ -64,13 +68,11 @@ class _Explainer:
         witness = self.verdict.witness
         if witness is None:
             return
-        start = replace(self.told, worst_start=witness.x0, worst_start_is="counterexample")
-        self.told = start
-        now = time.monotonic()
+        self.told = replace(self.told, worst_start=witness.x0, worst_start_is="counterexample")
         try:
             closest, breach = witnessed(
                 self.pair.source, self.pair.r_i, witness, self.pair.spec,
-                horizon=self.pair.source.horizon, deadline=now + 0.3 * max(0.0, self.end - now),
+                horizon=self.pair.source.horizon, deadline=time.monotonic() + WITNESS_SECONDS,
             )  # fmt: skip
         except ModegraphError:
             return
