@@ -180,9 +180,14 @@ def test_simulate_from_outside(model: str) -> None:
 
 
 def test_explain(model: str) -> None:
-    result = run("explain", model, "fast", "far", "--r-i", "1")
+    result = run("explain", model, "fast", "far", "--r-i", "1", "--seconds", "3")
     assert result.exit_code == 0
     assert "fast -> far: refuted" in result.stdout
+    data = loads(run("explain", model, "fast", "far", "--r-i", "1", "--seconds", "0", "--json").stdout)
+    assert (data["status"], data["r_i"], data["repairs"]) == ("refuted", [1.0], [])
+    assert data["notes"]
+    assert {"closest", "worst_start", "blocking", "missing"} <= set(data)
+    assert "seconds must be" in wrong(run("explain", model, "fast", "far", "--r-i", "1", "--seconds", "-1"))
     assert loads(run("explain", model, "slow", "fast", "--json").stdout)["status"] == "certified"
 
 

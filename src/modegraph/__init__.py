@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from modegraph.certify.references import References
     from modegraph.certify.verdict import Status, Verdict, Witness
     from modegraph.graph.build import build
+    from modegraph.graph.explanation import Explanation
     from modegraph.graph.modegraph import ModeGraph
+    from modegraph.graph.repairs import Repair
     from modegraph.graph.submodes import Submode
     from modegraph.graph.switch import Switch
     from modegraph.model.memory import Memory
@@ -41,6 +43,7 @@ __all__ = [
     "Ball",
     "Box",
     "Ellipsoid",
+    "Explanation",
     "Memory",
     "Mode",
     "ModeGraph",
@@ -50,6 +53,7 @@ __all__ = [
     "Points",
     "Polytope",
     "References",
+    "Repair",
     "Run",
     "Status",
     "Sublevel",
@@ -76,6 +80,7 @@ _HOME = {
     "Ball": "model.sets.ball",
     "Box": "model.sets.box",
     "Ellipsoid": "model.sets.ellipsoid",
+    "Explanation": "graph.explanation",
     "Memory": "model.memory",
     "Mode": "model.mode",
     "ModeGraph": "graph.modegraph",
@@ -83,6 +88,7 @@ _HOME = {
     "Points": "model.reference",
     "Polytope": "model.sets.polytope",
     "References": "certify.references",
+    "Repair": "graph.repairs",
     "Run": "run.simulate",
     "Status": "certify.verdict",
     "Sublevel": "model.sets.sublevel",

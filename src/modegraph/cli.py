@@ -17,7 +17,7 @@ from modegraph.certify.verdict import Status, Verdict
 from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
 from modegraph.model_file import ModelFile, load_model, shipped_example
 from modegraph.plan.as_json import json_text, plan_data, verdict_data
-from modegraph.report.tables import graph_data, print_checks, print_graph
+from modegraph.report.tables import explanation_data, graph_data, print_checks, print_graph
 
 YES, NO, WRONG, UNDECIDED = 0, 1, 2, 3
 
@@ -158,10 +158,11 @@ def explain(
     target: Annotated[str, typer.Argument(metavar="TO")],
     r_i: Annotated[str | None, typer.Option("--r-i", metavar="NUMBERS", help="Reference of FROM.")] = None,
     r_j: Annotated[str | None, typer.Option("--r-j", metavar="NUMBERS", help="Reference of TO.")] = None,
+    seconds: Annotated[float, typer.Option(help="Of work on repairs, after the proofs.")] = 30.0,
     as_json: Json = False,
     budget: Budget = None,
 ) -> int:
-    """Why there is, or is not, a switch from FROM to TO."""
+    """Why there is, or is not, a switch from FROM to TO, and which changes were proved to give it."""
     loaded = load_model(model)
     loaded.check_names({"start": source, "goal": target})
     told = loaded.build(budget).explain(
@@ -169,11 +170,9 @@ def explain(
         target,
         None if r_i is None else _numbers("--r-i", r_i),
         None if r_j is None else _numbers("--r-j", r_j),
+        seconds=seconds,
     )
-    if as_json:
-        typer.echo(json_text({"source": source, "target": target, **verdict_data(told.verdict)}))
-    else:
-        typer.echo(str(told))
+    typer.echo(json_text(explanation_data(told)) if as_json else str(told))
     return YES
 
 

@@ -8,9 +8,10 @@ import pytest
 from modegraph.certify.crossing import Missed
 from modegraph.certify.findings import Findings, merge
 from modegraph.certify.proof import SafetyProof, SwitchProof
+from modegraph.certify.verdict import Unproved
 
 MISSED = Missed(2.0, 1.0, True, np.zeros(1))
-EMPTY = Findings(missed={0: MISSED}, failure="at t = 0 s", unproved="constraint 'c'", empty=True)
+EMPTY = Findings(missed={0: MISSED}, failure="at t = 0 s", unproved=Unproved("c", 0.0, 1.0), empty=True)
 
 
 def undecided() -> Findings:

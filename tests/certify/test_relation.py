@@ -136,4 +136,4 @@ def test_the_volume_of_what_is_curved_is_proved_by_cells() -> None:
     share = float((refs.statuses(source, target) == 1).mean()) * 16.0
     assert 0.9 * share <= lower <= 1.03 * share
     # A start rests at every reference: nothing farther than the radius .25 of the target can be certified.
-    assert upper <= 1.03 * (16.0 - (4.0 - 0.25) ** 2)
+    assert upper <= 1.04 * (16.0 - (4.0 - 0.25) ** 2)

@@ -70,3 +70,22 @@ def test_the_tasks(graph: Any, module: Any) -> None:
     run = travel.simulate([-0.3, 0.2])
     assert run.ok
     assert abs(run.x[-1, 0] - 1.8) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("pair", "references"),
+    [(("slow", "fast"), ([0.0], [0.6])), (("fast", "slow"), ([0.0], [1.2])), (("slow", "slow"), ([0.6], [1.8]))],
+)
+def test_repairs_of_absent_switches_hold(graph: Any, module: Any, pair: Any, references: Any) -> None:
+    """A station off by d is entered by a ball a little larger than d; no smaller start moves where the mode rests."""
+    told = graph.explain(*pair, *references)
+    assert told.verdict.status is mg.Status.REFUTED
+    (repair,) = told.repairs
+    assert repair.kind == "grow target"
+    radius = graph.modes[pair[1]].start([0.0]).radius
+    gap = references[1][0] - references[0][0]
+    assert told.missing == pytest.approx(gap - radius)
+    assert gap < repair.value * radius < 1.05 * gap
+    built = mg.build(repair.modes, horizon=module.horizon)
+    assert built.verdict(*pair, *references).status is mg.Status.CERTIFIED
+    assert any("shrink start" in note for note in told.notes)

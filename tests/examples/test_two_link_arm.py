@@ -109,10 +109,40 @@ def test_several_chains_exist(graph: Any) -> None:
 
 def test_the_direct_way_is_no_edge_and_the_tool_says_why(graph: Any) -> None:
     assert graph.verdict("q5", "q8").status is not mg.Status.CERTIFIED
-    text = str(graph.explain("q5", "q8"))
+    text = str(graph.explain("q5", "q8", seconds=0.0))
     assert "q5" in text
     assert "q8" in text
     assert len(text) > 40
+
+
+@pytest.mark.parametrize(
+    ("pair", "kinds"),
+    [
+        ("q5 q8", {"grow target"}),
+        ("q4 q7", {"grow target"}),
+        ("q4 q8", {"grow target"}),
+        ("q4 q3", {"grow target", "shrink start"}),
+    ],
+)
+def test_repairs_of_absent_switches_hold(graph: Any, pair: str, kinds: set[str]) -> None:
+    """Each repair is applied: the pair alone, built afresh, has the switch."""
+    i, j = pair.split()
+    told = graph.explain(i, j, seconds=60.0)
+    assert told.blocking.startswith("the ellipsoid around")
+    assert told.missing > 0.0
+    assert told.closest.gauge > 1.0
+    assert {repair.kind for repair in told.repairs} == kinds
+    for repair in told.repairs:
+        built = mg.build([repair.source, repair.target], horizon=10.0)
+        assert built.verdict(i, j).status is mg.Status.CERTIFIED, repair.text
+        assert f"{repair.value:g} times" in str(told)
+
+
+def test_a_present_switch_tells_its_nearest_face(graph: Any) -> None:
+    told = graph.explain("q1", "q2", seconds=0.0)
+    assert told.repairs == ()
+    assert told.missing == pytest.approx(-told.verdict.margin)
+    assert "nearest face: the ellipsoid around (0, 1.6, 0, 0)" in str(told)
 
 
 def test_the_task_runs(graph: Any) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modegraph.expression import Graph, TracedArray
-from modegraph.expression.namespace import paused, tracing
+from modegraph.expression.namespace import _TracedModule, paused, tracing
 
 
 def test_undone_even_after_an_error() -> None:
@@ -76,3 +76,9 @@ def test_arrays_by_dtype() -> None:
         assert np.array([1, 2]).dtype.kind == "i"
         assert isinstance(np.array([1.0, 2.0]), TracedArray)
         assert np.full(2, True).dtype.kind == "b"
+
+
+def test_a_look_up_survives_the_end_of_the_last_trace_in_another_thread() -> None:
+    """The module was being traced when the attribute was asked for, and is plain before it is found."""
+    assert type(np) is ModuleType
+    assert _TracedModule.__getattribute__(np, "zeros") is np.zeros

@@ -99,8 +99,8 @@ ENGINE_FAULTS = (
     Fault(
         "a target holds the polynomial without its generators",
         "certify/region.py",
-        "            reach = bounds.upper(q) + spread\n",
-        "            reach = bounds.upper(q)\n",
+        "        reach = bounds.upper(q) + spread\n",
+        "        reach = bounds.upper(q)\n",
         ("tests/certify/test_region.py",),
     ),
     Fault(
@@ -375,6 +375,20 @@ ENGINE_FAULTS = (
         "rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None",
         "rest = _resting(mode, p, compiled)",
         ("tests/graph/test_classes.py::test_nothing_is_said_where_the_loop_is_not_defined",),
+    ),
+    Fault(
+        "a repair is told that no build confirms",
+        "graph/repairs.py",
+        "            if verdict.status is Status.CERTIFIED:\n                tried = (",
+        "            if verdict.reason:\n                tried = (",
+        ("tests/graph/test_explanation.py::test_what_build_does_not_confirm_is_not_told",),
+    ),
+    Fault(
+        "a repair leaves the modes as they are",
+        "graph/pair.py",
+        "modes=tuple(places.get(m.name, m) for m in self.modes)",
+        "modes=self.modes",
+        ("tests/graph/test_explanation.py::test_a_horizon_too_short_with_all_three_repairs",),
     ),
     Fault(
         "start sets of a class are as large as at its corners",

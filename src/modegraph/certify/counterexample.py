@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from ..enclosure.rounding import UNIT
 from ..expression.evaluate import Evaluator
 from ..expression.tape import Tape
+from ..model.mode import Mode
 from ..model.sets import Box, Set, is_subset
+from ..reach.compiled import CompiledMode
 from ..reach.field import Field
 from ..reach.flow import Flow, Order
 from ..reach.start import point
 from .region import Region
-from .verdict import Witness
+from .verdict import Unproved, Witness
 
 Floats = NDArray[np.float64]
 
@@ -57,10 +59,26 @@ class Scene:
         return np.array([min(max(0.5 * (lo + hi), lo), hi) for lo, hi in self.unknowns.values()])
 
 
+def scene_of(mode: Mode, compiled: CompiledMode) -> Scene:
+    """The scene of a mode under one reference."""
+    box = mode.system.disturbance
+    return Scene(
+        fields=compiled.fields,
+        start=compiled.one_start,
+        plant=compiled.plant,
+        w_lo=np.zeros(0) if box is None else np.asarray(box.lo, float),
+        w_hi=np.zeros(0) if box is None else np.asarray(box.hi, float),
+        unknowns=compiled.unknowns,
+        names=compiled.loop.names,
+        reset=compiled.own_reset,
+        stops=compiled.stops,
+    )
+
+
 class PointRun:
     """The validated trajectory of one start, one constant disturbance and known constants."""
 
-    def __init__(self, scene: Scene, x0: Floats, w: Floats, d: Floats) -> None:
+    def __init__(self, scene: Scene, x0: Floats, w: Floats, d: Floats, longest_step: float = np.inf) -> None:
         self.scene = scene
         self.x0, self.w, self.d = x0, w, d
         self.flow = Flow(
@@ -72,6 +90,7 @@ class PointRun:
             names=scene.names,
             reset=scene.reset if len(x0) == scene.plant else None,
             stops=scene.stops,
+            longest_step=longest_step,
         )
         self.violation: float | None = None
         self._seen = 0
@@ -89,13 +108,29 @@ class PointRun:
                 self.violation = step.end
 
     def _violated(self, t: float, p: Floats, G: Floats, segment: int) -> bool:
+        return bool((self._least(t, p, G, segment) > 0.0).any())
+
+    def _least(self, t: float, p: Floats, G: Floats, segment: int) -> Floats:
+        """Lower bounds of all constraint faces at one instant."""
         fld = self.flow.fields[segment]
         if not fld.faces:
-            return False
+            return np.zeros(0)
         inputs, radius = self.flow.variables_at(t, p, G, fld)
         value, off, _ = self.flow.evaluate(fld.observed, inputs, radius)
         count = len(fld.faces)
-        return bool((-self.flow.bounds.upper(-value[:count]) - off[:count] > 0.0).any())
+        return np.asarray(-self.flow.bounds.upper(-value[:count]) - off[:count])
+
+    def breach(self) -> Unproved | None:
+        """The constraint that is violated first, and by how much at that instant; None as long as none is."""
+        if self.violation is None:
+            return None
+        step = self.flow.steps[-1] if self.violation > 0.0 else None
+        at = (self.violation, self.flow.p0, self.flow.G0, 0)
+        if step is not None:
+            at = (step.end, step.p, step.G, step.segment)
+        least = self._least(*at)
+        k = int(np.argmax(least))
+        return Unproved(self.flow.fields[at[3]].faces[k], self.violation, float(least[k]))
 
     def apart_until(self, region: Region) -> float:
         """The trajectory is proved to be outside the target on [0, this instant) (seconds)."""
@@ -190,17 +225,24 @@ def trapped_in(scene: Scene, found: Equilibrium, region: Region) -> bool:
     return bool(outside[0]) and is_subset(box, scene.start)
 
 
+def moved_inside(start: Set, x: Floats) -> Floats | None:
+    """A point proved to lie in the set, x (n,) or one a little nearer to the centre; None where that is not enough."""
+    centre = np.asarray(start.center, float)
+    for shrink in (0.0, 1e-12, 1e-6, 1e-3, 0.05):
+        y = centre + (x - centre) * (1.0 - shrink)
+        if start.contains(y):
+            return np.asarray(y)
+    return None
+
+
 def candidate_starts(scene: Scene, hints: Sequence[Floats]) -> list[Floats]:
     """Points proved to lie in the start set: hints moved inside, the centre, and extreme ones."""
     centre = np.asarray(scene.start.center, float)
     found: list[Floats] = []
     for hint in [*hints, centre]:
-        x = hint
-        for shrink in (0.0, 1e-12, 1e-6, 1e-3, 0.05):
-            y = centre + (x - centre) * (1.0 - shrink)
-            if scene.start.contains(y):
-                found.append(y)
-                break
+        x = moved_inside(scene.start, hint)
+        if x is not None:
+            found.append(x)
     unique: list[Floats] = []
     for x in found:
         if not any(np.array_equal(x, y) for y in unique):

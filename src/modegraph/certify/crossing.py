@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,25 @@ DEEPEST_CELL = 7
 """A piece is cut into at most 2**DEEPEST_CELL cells, each with its own switching time."""
 
 
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """The set {p(xi) + sum_g G_g(xi) zeta_g + box(lost)} of one part of the starts, when it is nearest to a target.
+
+    Attributes
+    ----------
+    time : seconds
+    gauge : its bound in the target
+    bounds, p, G, lost : of p (n, N), G (g, n, Nq), lost (n,)
+    """
+
+    time: float
+    gauge: float
+    bounds: PolynomialBounds
+    p: Floats
+    G: Floats
+    lost: Floats
+
+
 @dataclass(frozen=True)
 class Crossing:
     """Proof that every start of a cell is in the target at grid instant ``instant`` of its flow.
@@ -36,6 +55,7 @@ class Crossing:
     best: float
     window: float
     energy: float
+    nearest: Nearest | None = None
 
 
 @dataclass(frozen=True)
@@ -46,7 +66,10 @@ class Missed:
     time: float
     hopeful: bool
     start: Floats
-    """Worst start (scaled variables of the piece)."""
+    """Worst start (scaled variables of the whole)."""
+    nearest: Nearest | None = None
+    sampled: bool = False
+    """``start`` is the worst of the sampled ones, not the middle of the worst part."""
 
 
 class Reach:
@@ -153,15 +176,16 @@ def _cross(
 ) -> list[Crossing] | Missed:
     gauges = region.swollen_gauges(bounds, p, generators, lost)
     inside = np.flatnonzero(gauges <= 1.0)
-    if len(inside):
-        return [_crossing(reach, region, bounds, p, gauges, int(inside[0]))]
     best = int(np.argmin(gauges))
-    missed = Missed(float(gauges[best]), float(reach.times[best]), False, piece.middle)
+    nearest = Nearest(float(reach.times[best]), float(gauges[best]), bounds, p[best], generators[best], lost[best])
+    if len(inside):
+        return [_crossing(reach, region, bounds, p, gauges, int(inside[0]), nearest)]
+    missed = Missed(nearest.gauge, nearest.time, False, piece.middle, nearest)
     if depth >= DEEPEST_CELL or piece.variables == 0:
         return missed
     hopeful, worst = _sampled(reach, region, piece, p, generators)
     if not hopeful:
-        return Missed(missed.gauge, missed.time, False, worst)
+        return replace(missed, start=worst, sampled=True)
     crossings: list[Crossing] = []
     variable = widest_variable(bounds, p[best])
     children = piece.split(variable)
@@ -175,13 +199,19 @@ def _cross(
         cells = PolynomialBounds(child, table, p.shape[2])
         found = _cross(reach, region, child, cells, q, generators, (lost + error) * 1.0000001, depth + 1)
         if isinstance(found, Missed):
-            return Missed(found.gauge, found.time, True, found.start)
+            return replace(found, hopeful=True)
         crossings += found
     return crossings
 
 
 def _crossing(
-    reach: Reach, region: Region, bounds: PolynomialBounds, p: Floats, gauges: Floats, instant: int
+    reach: Reach,
+    region: Region,
+    bounds: PolynomialBounds,
+    p: Floats,
+    gauges: Floats,
+    instant: int,
+    nearest: Nearest,
 ) -> Crossing:
     flow = reach.flow
     window = 0.0
@@ -199,8 +229,9 @@ def _crossing(
     if instant > 0:
         step = flow.steps[instant - 1]
         energy = float(flow.seen_bounds.upper(step.energy) + step.energy_radius)
-    best = float(gauges.min())
-    return Crossing(instant, float(reach.times[instant]), float(gauges[instant]), best, window, energy)
+    return Crossing(
+        instant, float(reach.times[instant]), float(gauges[instant]), nearest.gauge, window, energy, nearest
+    )
 
 
 def _sampled(
@@ -217,7 +248,7 @@ def _sampled(
     gauges = region.point_gauges(points, z if reach.flow.w_radius.any() else None)
     each = gauges.min(axis=0)
     worst = int(np.argmax(each))
-    return not piece.known or bool((each < 1.0).all()), eta[worst]
+    return not piece.known or bool((each < 1.0).all()), piece.middle + piece.radius * eta[worst]
 
 
 def widest_variable(bounds: PolynomialBounds, p: Floats) -> int:

@@ -15,7 +15,7 @@ from ..reach.tail import Tail
 from .crossing import proved_instants
 from .proof import SafetyProof, least_slack
 from .samples import sample_powers
-from .verdict import Widths
+from .verdict import Unproved, Widths
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +63,20 @@ def lasting(flows: Sequence[Flow], tail: Tail) -> SafetyProof:
     after = _by_name(flows[-1].fields[-1].faces, tail.face_upper)
     tracking = np.max([tail.tracking, *(step.tracking for flow in flows for step in flow.steps)], axis=0)
     return SafetyProof(least_slack([*(slack_until(f, len(f.steps)) for f in flows), after]), tail.start, tracking)
+
+
+def unproved(flow: Flow, proved: int) -> Unproved | None:
+    """The constraint that is not proved on the step after instant ``proved`` (-1: at the start)."""
+    if proved < 0:
+        upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+        names, when = flow.fields[flow.first_segment].faces, float(flow.times[0])
+    else:
+        step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
+        upper, names, when = step.face_upper, flow.fields[step.segment].faces, step.start
+    if not len(upper):
+        return None
+    k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
+    return Unproved(names[k], when, float(upper[k]))
 
 
 def width_over_time(flows: Sequence[Flow]) -> Widths | None:

@@ -23,7 +23,7 @@ from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
-from .evidence import lasting, sampled_violation, slack_until
+from .evidence import lasting, sampled_violation, slack_until, unproved
 from .findings import Findings, better, merge, settle
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
@@ -73,7 +73,10 @@ class Exploration:
         stops: Sequence[float],
         deadline: float,
         tick: Callable[[str], None],
+        until: float = np.inf,
     ) -> None:
+        """``until``: seconds after which nothing is looked at, the steps being those of the horizon."""
+        self.until = until
         self.fields, self.framed, self.goals, self.plant = fields, framed, goals, plant
         self.w_centre, self.w_radius = w
         self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
@@ -112,9 +115,9 @@ class Exploration:
 
     # -- one part --------------------------------------------------------------------------------
 
-    def decide(self, piece: Piece, wanted: Sequence[int]) -> Findings:
-        """Decide the wanted goals and the check for all starts."""
-        found = self.explore(piece, wanted, safety=True)
+    def decide(self, piece: Piece, wanted: Sequence[int], safety: bool = True) -> Findings:
+        """Decide the wanted goals, and the check for all starts."""
+        found = self.explore(piece, wanted, safety)
         if found.parked:
             chains = [self.chains[flow] for flow in found.parked]
             parts = [part for part in chains if not part.parked]
@@ -240,7 +243,7 @@ class Exploration:
         return found
 
     def _end(self) -> float:
-        return LONGEST if self.horizon is None else self.horizon
+        return min(self.until, LONGEST if self.horizon is None else self.horizon)
 
     def _advance(
         self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool
@@ -381,7 +384,7 @@ class Exploration:
         if flow.failure is not None:
             found.failure = str(flow.failure)
         if proved < len(short.steps):
-            found.unproved = self._unproved(short, proved)
+            found.unproved = unproved(short, proved)
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)
         found.safe_until = float(short.times[proved]) if proved >= 0 else float(short.times[0])
         for j in wanted:
@@ -422,9 +425,11 @@ class Exploration:
                     energy=max(c.energy for c in outcome),
                     slack=least_slack([*slack, slack_until(flow, latest)]),
                     parts=len(outcome),
+                    nearest=max(outcome, key=lambda c: c.best).nearest,
                 )
             if best is None or outcome.gauge < best.gauge:
-                best = outcome if flow is flows[0] and not before else replace(outcome, start=flows[0].piece.middle)
+                first = flow is flows[0] and not before
+                best = outcome if first else replace(outcome, start=(*before, *flows)[0].piece.middle, sampled=False)
             if proved_instants(flow) < len(flow.steps):
                 break
             slack.append(slack_until(flow, len(flow.steps)))
@@ -435,7 +440,8 @@ class Exploration:
             return best
         arrival = sinking.arrival(goal.region, self._end())
         if isinstance(arrival, Missed):
-            return replace(best, gauge=arrival.gauge, time=arrival.time) if arrival.gauge < best.gauge else best
+            closer = replace(arrival, start=best.start, hopeful=best.hopeful, sampled=best.sampled)
+            return closer if arrival.gauge < best.gauge else best
         arrived = float(np.nextafter(sinking.start + arrival.seconds, np.inf))
         spent = float(last.seen_bounds.upper(last.steps[-1].energy) + last.steps[-1].energy_radius)
         return SwitchProof(
@@ -446,6 +452,7 @@ class Exploration:
             energy=float(np.nextafter(spent + arrival.energy, np.inf)),
             slack=least_slack([*slack, sinking.slack()]),
             parts=1,
+            nearest=arrival.nearest,
         )
 
     def _safety(self, flows: Sequence[Flow], tail: Tail | None, before: Sequence[Flow] = ()) -> SafetyProof | None:
@@ -457,21 +464,6 @@ class Exploration:
                 return SafetyProof({}, flow.time, np.full(last.outputs, np.inf))
             return None
         return lasting([*before, *flows], tail)
-
-    def _unproved(self, flow: Flow, proved: int) -> str:
-        if proved < 0:
-            upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
-            names = flow.fields[flow.first_segment].faces
-            when = f"at t = {flow.times[0]:.4g}"
-        else:
-            step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
-            upper, names = step.face_upper, flow.fields[step.segment].faces
-            when = f"after t = {step.start:.4g} s"
-        if not len(upper):
-            return ""
-        k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
-        by = f"exceeded by up to {upper[k]:.3g}" if np.isfinite(upper[k]) else "not defined on the whole set"
-        return f"constraint '{names[k]}' cannot be proved {when} ({by})"
 
 
 def set_size(flow: Flow) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from ..reach.flow import Flow
 from .crossing import Missed
 from .proof import SafetyProof, SwitchProof, safe_together, together
+from .verdict import Unproved
 
 
 @dataclass
@@ -20,7 +21,7 @@ class Findings:
     safe_until: float = 0.0
     tail_reason: str = ""
     failure: str = ""
-    unproved: str = ""
+    unproved: Unproved | None = None
     broken: bool = False
     """A sampled start really breaks a constraint: smaller parts cannot help."""
     empty: bool = False
@@ -81,5 +82,5 @@ def merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], saf
     if all(not part.failure for part in parts):
         found.failure = ""
     if all(not part.unproved for part in parts):
-        found.unproved = ""
+        found.unproved = None
     return found

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from .crossing import Nearest
 from .verdict import Floats, Status, Verdict
 
 
@@ -25,6 +26,8 @@ class SwitchProof:
     energy: float
     slack: Mapping[str, float]
     parts: int
+    nearest: Nearest | None = field(default=None, compare=False)
+    """The part with the least margin, at its best instant."""
 
     def __post_init__(self) -> None:
         numbers = (self.earliest, self.latest, self.margin, self.window, self.energy)
@@ -69,6 +72,7 @@ def together(proofs: Sequence[SwitchProof | None]) -> SwitchProof | None:
         energy=max(p.energy for p in parts),
         slack=least_slack(p.slack for p in parts),
         parts=sum(p.parts for p in parts),
+        nearest=min(parts, key=lambda p: p.margin).nearest,
     )
 
 

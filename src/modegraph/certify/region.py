@@ -91,7 +91,6 @@ class Region:
 
         p (K, n, N) over the variables of ``bounds``; generators: K arrays (g, n, Nq).
         """
-        n = self.dim
         size = np.abs(p).sum(axis=-1)
         if not np.isfinite(size).all():
             known = np.isfinite(size).all(axis=1)
@@ -101,18 +100,39 @@ class Region:
                 out[known] = self.gauges(bounds, p[known], some)
             return out
         if self._faces is not None:
-            q = np.einsum("fi,kin->kfn", self.A, p)
-            spread = generator_sizes(self.A, generators)
-            reach = bounds.upper(q) + spread
-            rounding = 4.0 * (n + 4) * UNIT * (size @ np.abs(self.A).T + spread)
-            rounding += (size + generator_sizes(np.eye(n), generators)) @ self.dA.T * 1.001
-            slack = self.b - (reach + rounding)
-            slack = slack - 2.0 * UNIT * (np.abs(self.b) + np.abs(reach))
+            slack = self._slack(bounds, p, generators)
             worst = 1.0 - slack / self.distance
             # Rounding of the division must not turn a miss into a proof.
             worst = np.where(slack >= 0.0, np.minimum(worst, 1.0), np.maximum(worst, np.nextafter(1.0, 2.0)))
             return np.asarray(np.where(np.isnan(worst), np.inf, worst).max(axis=1))
         return self.quadric.gauges(bounds, p, generators)
+
+    def _slack(self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats]) -> Floats:
+        """Lower bounds (K, f) of the distance of each set from each face, in the unit of the face."""
+        n = self.dim
+        size = np.abs(p).sum(axis=-1)
+        q = np.einsum("fi,kin->kfn", self.A, p)
+        spread = generator_sizes(self.A, generators)
+        reach = bounds.upper(q) + spread
+        rounding = 4.0 * (n + 4) * UNIT * (size @ np.abs(self.A).T + spread)
+        rounding += (size + generator_sizes(np.eye(n), generators)) @ self.dA.T * 1.001
+        slack = self.b - (reach + rounding)
+        return np.asarray(slack - 2.0 * UNIT * (np.abs(self.b) + np.abs(reach)))
+
+    def binding(self, bounds: PolynomialBounds, p: Floats, G: Floats, lost: Floats) -> tuple[int, float]:
+        """The face that decides the gauge of one set, p (n, N), G (g, n, Nq), with a box of radii lost (n,) added.
+
+        Returns
+        -------
+        (int, float)
+            Its position, and how far the set reaches beyond it in its unit (negative: room); (-1, what is
+            missing of the gauge) where the target has no faces.
+        """
+        if self._faces is None:
+            return -1, float(self.swollen_gauges(bounds, p[None], [G], lost[None])[0]) - 1.0
+        slack = self._slack(bounds, p[None], [G])[0] - (np.abs(self.A) + self.dA) @ lost
+        k = int(np.argmin(slack / self.distance))
+        return k, -float(slack[k])
 
     def box_gauges(self, radius: Floats) -> Floats:
         """What adding a box of radii (K, n) can add to the gauge."""

@@ -12,7 +12,7 @@ from ..reach.decay import SettledLoop
 from ..reach.flow import Flow
 from ..reach.funnel import Funnel, FunnelBuilder, NoFunnel, NormBall
 from ..reach.tail import Tail
-from .crossing import Missed
+from .crossing import Missed, Nearest
 from .proof import least_slack
 from .region import Region
 from .samples import sample_powers
@@ -33,6 +33,7 @@ class Arrival:
     best: float
     energy: float
     """Bound of int u'u after the flow."""
+    nearest: Nearest | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Sinking:
         # Room for the rounding of sums of times.
         left = (limit - self.start) * (1.0 - 1e-8)
         elapsed = energy = 0.0
-        best = math.inf
+        best, at = math.inf, (self.rung, self.radius, 0.0)
         arrived: tuple[float, float] | None = None
         radius = self.radius
         for k in range(self.rung, len(self.funnel.rungs)):
@@ -76,7 +77,8 @@ class Sinking:
                 seconds = max(0.0, left - elapsed)
                 low = rung.after(radius, seconds)
             gauge = self._gauge(k, low, region)
-            best = min(best, gauge)
+            if gauge < best:
+                best, at = gauge, (k, low, elapsed + seconds)
             if arrived is None and gauge <= 1.0:
                 taken = self._within(k, radius, low, seconds, region)
                 arrived = elapsed + taken, energy + taken * rung.power
@@ -87,10 +89,13 @@ class Sinking:
             energy += seconds * rung.power
             # The next rung is entered with rho <= its own radius, in its own norm.
             radius = rung.lower if k + 1 < len(self.funnel.rungs) and self._same(k) else math.inf
+        bounds, p, G = self.funnel.ball(*at[:2]).set
+        n = region.dim
+        nearest = Nearest(self.start + at[2], best, bounds, p[:n], G[:, :n], np.zeros(n))
         if arrived is None:
-            return Missed(best, self.start + elapsed, False, np.zeros(0))
+            return Missed(best, self.start + elapsed, False, np.zeros(0), nearest)
         slack = 1.0 + 1e-9
-        return Arrival(arrived[0] * slack, best, arrived[1] * slack)
+        return Arrival(arrived[0] * slack, best, arrived[1] * slack, nearest)
 
     def _same(self, k: int) -> bool:
         return self.funnel.rungs[k].norm is self.funnel.rungs[k + 1].norm

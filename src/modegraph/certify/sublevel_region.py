@@ -103,6 +103,10 @@ class SublevelRegion(Region):
             return self.gauges(bounds, p, generators)
         return self.gauges(bounds, p, [_with_box(G, r) for G, r in zip(generators, radius, strict=True)])
 
+    def binding(self, bounds: PolynomialBounds, p: Floats, G: Floats, lost: Floats) -> tuple[int, float]:
+        gauge = float(self.swollen_gauges(bounds, p[None], [G], lost[None])[0])
+        return -1, (gauge - 1.0) * float(self.distance[0])
+
     def tube_gauges(self, bounds: PolynomialBounds, p: Floats, out: Floats) -> Floats:
         # No convexity: the chord itself is a generator around its middle.
         middle, half = 0.5 * (p[:-1] + p[1:]), 0.5 * (p[1:] - p[:-1])

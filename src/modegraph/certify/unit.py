@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -16,13 +17,24 @@ from ..model.target import Target
 from ..reach.compiled import CompiledMode, compile_mode, compile_reset
 from ..reach.flow import Flow, Order
 from ..reach.tail import Tail, TailSearch
-from .counterexample import Equilibrium, PointRun, Scene, candidate_starts, enclose_equilibrium, trapped_in
+from .approach import approach_of
+from .counterexample import (
+    Equilibrium,
+    PointRun,
+    Scene,
+    candidate_starts,
+    enclose_equilibrium,
+    moved_inside,
+    scene_of,
+    trapped_in,
+)
+from .crossing import Nearest
 from .evidence import slack_until, width_over_time
 from .exploration import Exploration, Findings, Goal
 from .proof import SwitchProof, certified_check, certified_switch
 from .region import Region
 from .sublevel_region import target_region
-from .verdict import Floats, Status, Verdict, Witness
+from .verdict import Approach, Floats, Status, Verdict, Witness
 
 POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""
@@ -53,6 +65,8 @@ def certify_unit(
     horizon: float | None,
     deadline: float,
     progress: Callable[[str], None] | None = None,
+    switches_only: bool = False,
+    until: float = np.inf,
 ) -> UnitResult:
     """Decide condition (C) for every target, and Assumption 1, from the flowpipe of one mode.
 
@@ -60,9 +74,13 @@ def certify_unit(
     ----------
     horizon : seconds a switch may take; None: until a tail is certified or the deadline.
     deadline : instant of ``time.monotonic()`` after which what is not decided is UNDECIDED.
+    switches_only : look for proofs of switches alone, not for that of Assumption 1 nor for counterexamples
+        (but for equilibria, which cost nothing).
+    until : seconds after which no proof of a switch is looked for, for a quick answer.
     """
     compiled = compile_mode(mode, p)
-    return _Unit(mode, p, compiled, targets, horizon, deadline, progress or (lambda text: None)).run()
+    tick = progress or (lambda text: None)
+    return _Unit(mode, p, compiled, targets, horizon, deadline, tick, switches_only, until).run()
 
 
 def exploration_of(
@@ -71,6 +89,7 @@ def exploration_of(
     horizon: float | None,
     deadline: float,
     tick: Callable[[str], None],
+    until: float = np.inf,
 ) -> Exploration:
     """The exploration of a compiled mode."""
     return Exploration(
@@ -85,7 +104,20 @@ def exploration_of(
         stops=compiled.stops,
         deadline=deadline,
         tick=tick,
+        until=until,
     )
+
+
+def goal_of(spec: TargetSpec, plant: int) -> Goal:
+    """A target as the exploration sees it, for a source with ``plant`` plant states."""
+    if isinstance(spec.mode, Target):
+        spec.mode.settle(plant)
+        return Goal(target_region(spec.mode.set), None)
+    target = mode_start(spec.mode, spec.p)
+    reset = None
+    if target.dim > plant:
+        reset = compile_reset(close_loop(spec.mode, spec.p))
+    return Goal(target_region(target), reset)
 
 
 class _Unit:
@@ -98,8 +130,11 @@ class _Unit:
         horizon: float | None,
         deadline: float,
         tick: Callable[[str], None],
+        switches_only: bool,
+        until: float,
     ) -> None:
-        self.mode, self.p, self.compiled = mode, p, compiled
+        self.until = until
+        self.mode, self.p, self.compiled, self.switches_only = mode, p, compiled, switches_only
         self.targets, self.horizon, self.deadline, self.tick = targets, horizon, deadline, tick
         self.verdicts: dict[int, Verdict] = {}
         self.goals: dict[int, Goal] = {}
@@ -109,7 +144,7 @@ class _Unit:
     def run(self) -> UnitResult:
         for k, spec in enumerate(self.targets):
             try:
-                self.goals[k] = self._goal(spec)
+                self.goals[k] = goal_of(spec, self.compiled.plant)
             except ModegraphError as error:
                 self.verdicts[k] = Verdict(Status.UNDECIDED, str(error), horizon=self.horizon)
         try:
@@ -122,32 +157,23 @@ class _Unit:
         assert self.check is not None
         return UnitResult([self.verdicts[k] for k in range(len(self.targets))], self.check)
 
-    def _goal(self, spec: TargetSpec) -> Goal:
-        if isinstance(spec.mode, Target):
-            spec.mode.settle(self.compiled.plant)
-            return Goal(target_region(spec.mode.set), None)
-        target = mode_start(spec.mode, spec.p)
-        reset = None
-        if target.dim > self.compiled.plant:
-            reset = compile_reset(close_loop(spec.mode, spec.p))
-        return Goal(target_region(target), reset)
-
     # -- proofs ----------------------------------------------------------------------------------
 
     def _prove(self) -> None:
         compiled = self.compiled
-        exploration = exploration_of(compiled, dict(self.goals), self.horizon, self.deadline, self.tick)
+        exploration = exploration_of(compiled, dict(self.goals), self.horizon, self.deadline, self.tick, self.until)
         self._switches_in_zero_time()
-        scene = self._scene()
+        scene = scene_of(self.mode, self.compiled)
         self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])
         wanted = [k for k in self.goals if k not in self.verdicts]
-        found = exploration.decide(compiled.whole(), wanted)
+        found = exploration.decide(compiled.whole(), wanted, safety=not self.switches_only)
         for k in wanted:
             if k in found.proofs:
-                self.verdicts[k] = certified_switch(found.proofs[k], self.horizon)
+                self.verdicts[k] = self._switch(k, found.proofs[k])
         if found.safety is not None:
             self.check = certified_check(found.safety)
-        self._refute(scene, found)
+        if not self.switches_only:
+            self._refute(scene, found)
         for k in wanted:
             if k not in self.verdicts:
                 self.verdicts[k] = self._undecided(found, k)
@@ -158,6 +184,9 @@ class _Unit:
         self.check = replace(self.check, widths=widths)
         for k in wanted:
             self.verdicts[k] = replace(self.verdicts[k], widths=widths)
+            if self.verdicts[k].status is not Status.CERTIFIED:
+                closest, unproved = self._missed(found, k), found.unproved
+                self.verdicts[k] = replace(self.verdicts[k], closest=closest, unproved=unproved)
 
     def _switches_in_zero_time(self) -> None:
         """S_i inside S_j, decided exactly, with the constraints proved at t = 0."""
@@ -179,26 +208,23 @@ class _Unit:
             return
         slack = slack_until(flow, 0)
         for k in candidates:
-            gauge = float(self.goals[k].region.gauges(flow.bounds, flow.p0[None, : compiled.plant], [flow.G0])[0])
-            proof = SwitchProof(0.0, 0.0, max(0.0, 1.0 - gauge), 0.0, 0.0, slack, 1)
-            self.verdicts[k] = certified_switch(proof, self.horizon)
+            n, region = compiled.plant, self.goals[k].region
+            gauge = float(region.gauges(flow.bounds, flow.p0[None, :n], [flow.G0])[0])
+            nearest = Nearest(0.0, gauge, flow.bounds, flow.p0, flow.G0, np.zeros(n))
+            self.verdicts[k] = self._switch(
+                k, SwitchProof(0.0, 0.0, max(0.0, 1.0 - gauge), 0.0, 0.0, slack, 1, nearest)
+            )
+
+    def _switch(self, k: int, proof: SwitchProof) -> Verdict:
+        closest = approach_of(proof.nearest, self.goals[k].region, self._names(k))
+        return replace(certified_switch(proof, self.horizon), closest=closest)
+
+    def _names(self, k: int) -> Sequence[str]:
+        """States over which target k is a set."""
+        target = self.targets[k].mode
+        return self.compiled.loop.names if isinstance(target, Target) else target.state_names
 
     # -- counterexamples -------------------------------------------------------------------------
-
-    def _scene(self) -> Scene:
-        compiled = self.compiled
-        box = self.mode.system.disturbance
-        return Scene(
-            fields=compiled.fields,
-            start=compiled.one_start,
-            plant=compiled.plant,
-            w_lo=np.zeros(0) if box is None else np.asarray(box.lo, float),
-            w_hi=np.zeros(0) if box is None else np.asarray(box.hi, float),
-            unknowns=compiled.unknowns,
-            names=compiled.loop.names,
-            reset=compiled.own_reset,
-            stops=compiled.stops,
-        )
 
     def _trap_all(self, scene: Scene, left: list[int]) -> None:
         """Equilibria under constant disturbances: one serves all targets, and it costs almost nothing."""
@@ -344,7 +370,7 @@ class _Unit:
                 f"reaches {missed.gauge:.3g} times the size of the target (1 is needed)"
             )
         if found.unproved:
-            parts.append(found.unproved)
+            parts.append(str(found.unproved))
         if found.failure:
             parts.append("the flowpipe ends " + found.failure)
         if time.monotonic() > self.deadline:
@@ -355,8 +381,22 @@ class _Unit:
             parts.append("a smaller start set or a slightly larger target would help")
         return Verdict(Status.UNDECIDED, "; ".join(parts), margin=margin, horizon=self.horizon)
 
+    def _missed(self, found: Findings, k: int) -> Approach | None:
+        """How near the starts come to target k, and the worst of them."""
+        missed = found.missed.get(k)
+        if missed is None:
+            return None
+        closest = approach_of(missed.nearest, self.goals[k].region, self._names(k))
+        chart = found.flow.piece.chart if found.flow is not None else None
+        if closest is None or chart is None or len(missed.start) < chart.free:
+            return closest
+        start = moved_inside(self.compiled.one_start, chart.centre + chart.axes @ missed.start[: chart.free])
+        origin: Literal["sampled", "middle"] = "sampled" if missed.sampled else "middle"
+        return closest if start is None else replace(closest, start=start, origin=origin)
+
     def _unchecked(self, found: Findings) -> Verdict:
-        parts = [text for text in (found.unproved, found.failure and "the flowpipe ends " + found.failure) if text]
+        parts = [str(found.unproved)] if found.unproved else []
+        parts += ["the flowpipe ends " + found.failure] if found.failure else []
         if not parts:
             tail = found.tail_reason or "no invariant set was tried"
             parts = [f"constraints proved until t = {found.safe_until:.4g} s, but not for all time: {tail}"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -70,6 +71,56 @@ class Widths:
 
 
 @dataclass(frozen=True)
+class Approach:
+    """How near the worst part of the starts comes to the target, at its best time.
+
+    Attributes
+    ----------
+    time : float
+        Seconds after entering the source.
+    gauge : float
+        1 on the boundary of the target, less inside; an upper bound for everything that part can reach.
+    face : str
+        The face of the target that decides it, in words: "position <= 0.1", "the ball of radius ...".
+    missing : float
+        How far beyond that face the set reaches, in ``unit``; negative: the room that is left.
+    unit : str
+        What ``missing`` is measured in: a state, a combination of states, "distance", ...
+    detail : str
+        For a round target, the state in which the set is farthest out, relative to the size of the target.
+    start : (n,) array or None
+        The worst start.
+    origin : {"sampled", "middle", "witness", ""}
+        Where ``start`` is from: the worst of some sampled starts, the middle of the worst part, the
+        counterexample; "" without a start.
+    """
+
+    time: float
+    gauge: float
+    face: str
+    missing: float
+    unit: str
+    detail: str = ""
+    start: Floats | None = None
+    origin: Literal["sampled", "middle", "witness", ""] = ""
+
+
+@dataclass(frozen=True)
+class Unproved:
+    """The first constraint that could not be proved: from ``time`` seconds on, exceeded by up to ``by`` (inf, NaN:
+    not defined) in its own unit."""
+
+    constraint: str
+    time: float
+    by: float
+
+    def __str__(self) -> str:
+        when = f"at t = {self.time:.4g}" if self.time == 0.0 else f"after t = {self.time:.4g} s"
+        by = f"exceeded by up to {self.by:.3g}" if math.isfinite(self.by) else "not defined on the whole set"
+        return f"constraint '{self.constraint}' cannot be proved {when} ({by})"
+
+
+@dataclass(frozen=True)
 class Verdict:
     """One answer, with the reason and the numbers that belong to it.
 
@@ -101,6 +152,10 @@ class Verdict:
         ``check`` only: certified bound of |h(x) - r| over the proved time, per output.
     widths : Widths or None
         How wide the reach set was over time, on the part of the starts that was followed last.
+    closest : Approach or None
+        How near the worst part of the starts comes to the target; None where no bound was computed.
+    unproved : Unproved or None
+        The constraint that stood in the way of the proof, if one did.
     """
 
     status: Status
@@ -115,3 +170,5 @@ class Verdict:
     window: float | None = None
     tracking: Floats | None = None
     widths: Widths | None = None
+    closest: Approach | None = None
+    unproved: Unproved | None = None

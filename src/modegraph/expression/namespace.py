@@ -138,10 +138,11 @@ class _TracedModule(ModuleType):
     """A module whose attributes depend on who asks."""
 
     def __getattribute__(self, name: str) -> Any:
-        original = super().__getattribute__(name)
+        # Not by super(): another thread may have ended the last trace, and the module is a plain one again.
+        original = ModuleType.__getattribute__(self, name)
         if not _state.depth:
             return original
-        replacement = _TABLES[super().__getattribute__("__name__")].get(name)
+        replacement = _TABLES[ModuleType.__getattribute__(self, "__name__")].get(name)
         if replacement is None:
             return original
         caller = sys._getframe(1).f_globals.get("__name__", "")

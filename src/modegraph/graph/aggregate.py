@@ -37,9 +37,10 @@ def some_pair(cases: Sequence[Case]) -> Verdict:
             horizon=_smallest(v.horizon for v in verdicts if v.horizon is not None),
             energy=_largest(v.energy for v in verdicts),
             window=_smallest(v.window for v in verdicts),
+            closest=deciding_pair(certified)[2].closest,
         )
     rest = undecided or cases
-    closest = max(rest, key=lambda c: -np.inf if c[2].margin is None else c[2].margin)
+    closest = deciding_pair(rest)
     horizons = [v.horizon for _, _, v in rest if v.horizon is not None]
     if undecided:
         share = "all" if len(undecided) == count else f"{len(undecided)} of"
@@ -56,7 +57,18 @@ def some_pair(cases: Sequence[Case]) -> Verdict:
         witness=closest[2].witness,
         horizon=min(horizons) if horizons else None,
         until=closest[2].until,
+        closest=closest[2].closest,
+        unproved=closest[2].unproved,
     )
+
+
+def deciding_pair(cases: Sequence[Case]) -> Case:
+    """The pair an existential verdict speaks of: the certified one with the least margin, else the closest one."""
+    certified = [c for c in cases if c[2].status is Status.CERTIFIED]
+    if certified:
+        return min(certified, key=lambda c: np.inf if c[2].margin is None else c[2].margin)
+    rest = [c for c in cases if c[2].status is Status.UNDECIDED] or cases
+    return max(rest, key=lambda c: -np.inf if c[2].margin is None else c[2].margin)
 
 
 def every_member(cases: Sequence[tuple[Parameter, Verdict]]) -> Verdict:

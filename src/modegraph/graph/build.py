@@ -92,7 +92,7 @@ def build(
         for node, verdict in zip(unit.target_nodes, result.finite.verdicts, strict=True):
             verdicts[unit.node, node] = verdict
     regions = {m.name: m.reference.region for m in modes if isinstance(m, Mode) and m.reference.region is not None}
-    return ModeGraph(modes, verdicts, checks, Classes(regions, links))
+    return ModeGraph(modes, verdicts, checks, Classes(regions, links), horizon)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +166,23 @@ def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]
 
 def _is_class(mode: Mode | Target) -> bool:
     return isinstance(mode, Mode) and mode.reference.region is not None
+
+
+def node_verdict(
+    modes: Sequence[Mode | Target], source: Node, target: Node, *, horizon: float | None, deadline: float
+) -> Verdict:
+    """The verdict on one pair of nodes of finite classes, from the very unit of work that ``build`` would do.
+
+    Parameters
+    ----------
+    deadline : instant of ``time.monotonic()`` after which what is not decided is UNDECIDED.
+    """
+    unit = next(u for u in _units(validate_modes(modes), horizon) if u.node == source)
+    with one_core():
+        found = certify_unit(
+            unit.mode, unit.parameter, list(unit.targets), horizon=unit.horizon, deadline=deadline, progress=None
+        )
+    return found.verdicts[unit.target_nodes.index(target)]
 
 
 def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None], thorough: bool) -> _Result:

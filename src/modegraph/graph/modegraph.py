@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import cached_property
 from types import MappingProxyType
@@ -13,10 +12,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from modegraph.certify.continuous import ContinuousReferences
-from modegraph.certify.references import Cell, Parameter, References, parameter_text
-from modegraph.certify.verdict import Status, Verdict, Widths
+from modegraph.certify.references import Cell, Parameter, References
+from modegraph.certify.verdict import Status, Verdict
 from modegraph.errors import ModegraphError, NotBuiltYet
-from modegraph.graph.aggregate import Case, every_member, some_pair
+from modegraph.graph.aggregate import Case, deciding_pair, every_member, some_pair
 from modegraph.graph.classes import Classes, Floats, Link
 from modegraph.graph.entry import may_enter, plain_state
 from modegraph.graph.submodes import Edge, Submode, algorithm_1
@@ -25,23 +24,11 @@ from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 
 if TYPE_CHECKING:
+    from modegraph.graph.explanation import Explanation
     from modegraph.plan.plan import Plan
 
 Node = tuple[str, int]
 """A mode and the position of one reference in its class (0 for a Target)."""
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """Why there is, or is not, a switch; ``str()`` is the text."""
-
-    source: str
-    target: str
-    verdict: Verdict
-    text: str
-
-    def __str__(self) -> str:
-        return self.text
 
 
 class ModeGraph:
@@ -57,6 +44,8 @@ class ModeGraph:
         The nodes of Algorithm 1.
     edges : tuple[Edge, ...]
         Its edges, of both kinds.
+    horizon : float or None
+        Seconds, as given to ``build``.
     """
 
     def __init__(
@@ -65,11 +54,14 @@ class ModeGraph:
         verdicts: Mapping[tuple[Node, Node], Verdict],
         checks: Mapping[Node, Verdict],
         classes: Classes | None = None,
+        horizon: float | None = None,
     ) -> None:
         """Collect the verdicts of all ordered pairs of nodes and the check of every node.
 
-        A continuous class is one node, (name, 0), in ``checks`` and in the links of ``classes``.
+        A continuous class is one node, (name, 0), in ``checks`` and in the links of ``classes``. ``horizon``:
+        of the modes without one of their own.
         """
+        self.horizon = horizon
         self._modes = {m.name: m for m in modes}
         self._verdicts = dict(verdicts)
         self._checks = dict(checks)
@@ -173,11 +165,43 @@ class ModeGraph:
             return self._checks[name, 0]
         return every_member([(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)])
 
-    def explain(self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None) -> Explanation:
-        """The verdict on i -> j told in words: reason, figures, counterexample."""
+    def explain(
+        self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None, *, seconds: float = 30.0
+    ) -> Explanation:
+        """Why there is, or is not, a switch i -> j, and for an absent one which changes were proved to give it.
+
+        Without references it is about the pair that decides the verdict: the certified one with the least
+        margin, or the one that comes closest.
+
+        Parameters
+        ----------
+        seconds : float
+            Of work on what the proofs of ``build`` have not shown yet, above all on repairs. What is not
+            found by then is left out, and said to be.
+
+        Raises
+        ------
+        ModegraphError
+            As for ``verdict``, or if ``seconds`` is not a number >= 0.
+        """
+        from modegraph.graph.explain import explained
+
         source, target = self.name_of(i), self.name_of(j)
-        verdict = self.verdict(source, target, r_i, r_j)
-        return Explanation(source, target, verdict, _explained(source, target, verdict))
+        return explained(self, source, target, self.verdict(source, target, r_i, r_j), r_i, r_j, seconds)
+
+    def deciding(self, i: str, j: str, r_i: Any, r_j: Any) -> Case | None:
+        """The pair of references that the verdict on i -> j speaks of; None where there is none."""
+        if not self._classes.involves(i, j):
+            return deciding_pair(self._cases(i, j, r_i, r_j))
+        left, right = (self._member(name, r) for name, r in ((i, r_i), (j, r_j)))
+        best = self.references(i, j).best(*(None if side is None else side[1] for side in (left, right)))
+        if best is None:
+            return None
+        sides = [
+            p if name in self._classes.regions else self._parameters[name][a]
+            for name, a, p in zip((i, j), best[0], best[1:3], strict=True)
+        ]
+        return sides[0], sides[1], self._class_verdict(i, j, r_i, r_j)
 
     def plan(
         self,
@@ -436,53 +460,3 @@ def _switch_of(i: str, j: str, references: References | ContinuousReferences, v:
     if v.time is None:
         raise ValueError(f"the certified verdict {i} -> {j} has no time")
     return Switch(i, j, references, v.time, v.energy, v.margin, v.window)
-
-
-def _explained(i: str, j: str, v: Verdict) -> str:
-    lines = [f"{i} -> {j}: {v.status.value}", f"  {v.reason}"]
-    if v.time is not None:
-        lines.append(f"  time: enters between {v.time[0]:.6g} and {v.time[1]:.6g} s")
-    for label, value, unit in (
-        ("margin", v.margin, ""),
-        ("energy", v.energy, ""),
-        ("stays inside", None if v.window == math.inf else v.window, " s"),
-        ("examined up to", v.horizon, " s"),
-        ("constraints proved up to", v.until, " s"),
-    ):
-        if value is not None:
-            lines.append(f"  {label}: {value:.4g}{unit}")
-    if v.window == math.inf:
-        lines.append("  stays inside: for ever")
-    for name, slack in v.slack.items():
-        lines.append(f"  slack of {name}: {slack:.4g}")
-    if v.witness is not None:
-        w = v.witness
-        what = {
-            "violates": f"violates a constraint at {w.time:.6g} s",
-            "trapped": f"never arrives (trapped from {w.time:.6g} s on)",
-            "horizon": f"has not arrived by {w.time:.6g} s",
-        }[w.kind]
-        lines.append(f"  counterexample: the start x0 = {parameter_text(np.asarray(w.x0))} {what}")
-        if w.w is not None:
-            lines.append(f"    with the constant disturbance w = {parameter_text(w.w)}")
-        if w.d:
-            lines.append("    with " + ", ".join(f"{n} = {value:.6g}" for n, value in w.d.items()))
-        if w.r_i is not None:
-            lines.append(f"    with r_i = {parameter_text(w.r_i)}")
-        if w.r_j is not None:
-            lines.append(f"    with r_j = {parameter_text(w.r_j)}")
-    if v.widths is not None:
-        lines += _widths_table(v.widths)
-    return "\n".join(lines)
-
-
-def _widths_table(widths: Widths) -> list[str]:
-    """Lines of a table: one row an instant, one column a state."""
-    columns = [max(len(name), 9) for name in widths.states]
-    lines = ["  width of the reach set over time:"]
-    lines.append(
-        "    " + f"{'t, s':>9s}" + "".join(f"  {n:>{c}s}" for n, c in zip(widths.states, columns, strict=True))
-    )
-    for t, row in zip(widths.times, widths.values, strict=True):
-        lines.append(f"    {t:9.4g}" + "".join(f"  {value:>{c}.4g}" for value, c in zip(row, columns, strict=True)))
-    return lines

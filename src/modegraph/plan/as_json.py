@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,6 +62,8 @@ def verdict_data(v: Verdict) -> dict[str, Any]:
         "widths": None if v.widths is None else {
             "states": list(v.widths.states), "times": v.widths.times, "values": v.widths.values,
         },
+        "closest": None if v.closest is None else asdict(v.closest),
+        "unproved": None if v.unproved is None else asdict(v.unproved),
     }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from modegraph.certify.verdict import Status, Verdict
@@ -12,6 +13,7 @@ from modegraph.model.target import Target
 from modegraph.plan.as_json import switch_data, verdict_data
 
 if TYPE_CHECKING:
+    from modegraph.graph.explanation import Explanation
     from modegraph.graph.modegraph import ModeGraph
     from modegraph.run.simulate import Run
 
@@ -27,6 +29,30 @@ def graph_data(graph: ModeGraph) -> dict[str, Any]:
         "verdicts": [{"source": i, "target": j, **verdict_data(v)} for i, j, v in _verdicts(graph)],
         "checks": {name: verdict_data(v) for name, v in _checks(graph).items()},
         "switches": [switch_data(s) for s in graph.switches],
+    }
+
+
+def explanation_data(e: Explanation) -> dict[str, Any]:
+    """An explanation: the verdict, and what is known beside it. The changed modes of a repair are not data."""
+    return {
+        "source": e.source,
+        "target": e.target,
+        **verdict_data(e.verdict),
+        "r_i": e.r_i,
+        "r_j": e.r_j,
+        "closest": None if e.closest is None else asdict(e.closest),
+        "reach": None if e.reach is None else asdict(e.reach),
+        "worst_start": e.worst_start,
+        "worst_start_is": e.worst_start_is,
+        "blocking": e.blocking,
+        "missing": e.missing,
+        "block": None if e.block is None else asdict(e.block),
+        "repairs": [
+            {"kind": r.kind, "value": r.value, "missed": r.missed, "text": r.text, "verdict": verdict_data(r.verdict)}
+            for r in e.repairs
+        ],
+        "notes": list(e.notes),
+        "text": e.text,
     }
 
 
