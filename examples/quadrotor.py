@@ -60,23 +60,23 @@ SINK = 0.25  # m/s
 
 def settle(x, r):
     """Hold the place r = (x,) and sink slowly until the legs touch."""
-    return rotors(x, POSITION * (r[0] - x[0]) - RATE * x[3], 8.0 * (-SINK - x[4]))
+    return rotors(x, POSITION * (r[0] - x[0]) - RATE * x[3], 5.0 * (-SINK - x[4]))
 
 
 def in_flight(x, u):
     return {
-        "pitch": abs(x[2]) <= 0.6,  # rad
+        "pitch": abs(x[2]) <= 0.7,  # rad
         "speed": abs(x[3:5]) <= 3.5,  # m/s
-        "thrust": abs(u - 3.0) <= 2.8,  # N a rotor
+        "thrust": abs(u - 3.0) <= 2.95,  # N a rotor
         "ground": x[1] >= 0.0,  # m
     }
 
 
 def near_ground(x, u):
     return {
-        "pitch": abs(x[2]) <= 0.4,
-        "speed": abs(x[3:5]) <= [1.0, 0.5],
-        "thrust": abs(u - 3.0) <= 2.8,
+        "pitch": abs(x[2]) <= 0.7,
+        "speed": abs(x[3:5]) <= [1.5, 0.6],
+        "thrust": abs(u - 3.0) <= 2.95,
     }
 
 
@@ -97,8 +97,8 @@ def smooth(t, duration):
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-CRUISE, CLIMB, LAND = 5.0, 4.0, 4.0  # s
-FLARE = 0.12  # m above the ground, where a descent ends
+CRUISE, CLIMB, LAND = 6.0, 5.0, 4.0  # s
+FLARE = 0.15  # m above the ground, where a descent ends
 
 
 def level(t, p):
@@ -123,7 +123,7 @@ def on_the_ground():
     return A, np.array([0.0, 0.2, 0.2, 0.6, 0.6, 0.4])
 
 
-CALM = [0.3, 0.15, 0.18, 0.5, 0.22, 0.7]
+CALM = [0.3, 0.15, 0.18, 0.55, 0.22, 0.7]
 WIDE = [0.5, 0.3, 0.2, 0.7, 0.4, 0.8]
 
 modes = [
@@ -143,21 +143,21 @@ modes = [
         reference=mg.trajectory(vertical, CLIMB, over=mg.Box([-6.0, 1.0, 1.0], [6.0, 6.0, 6.0])),
         start=around(CALM),
         constraints=in_flight,
-        horizon=6.0,
+        horizon=6.5,
     ),
     mg.Mode(
         "cruise",
         quadrotor,
         controller=follow(6.0, 5.0),
-        reference=mg.trajectory(level, CRUISE, over=mg.Box([-6.0, 1.0, -5.0], [6.0, 6.0, 5.0])),
+        reference=mg.trajectory(level, CRUISE, over=mg.Box([-6.0, 1.0, -7.0], [6.0, 6.0, 7.0])),
         start=around(CALM),
         constraints=in_flight,
-        horizon=7.0,
+        horizon=7.5,
     ),
     mg.Mode(
         "land",
         quadrotor,
-        controller=follow(16.0, 8.0),
+        controller=follow(6.0, 5.0),
         reference=mg.trajectory(descent, LAND, over=mg.Box([-6.0, 1.0], [6.0, 2.5])),
         start=around(CALM),
         constraints=in_flight,
@@ -168,7 +168,7 @@ modes = [
         quadrotor,
         controller=settle,
         reference=mg.setpoint(mg.Box([-6.0], [6.0])),
-        start=lambda r: around([0.3, 0.1, 0.18, 0.5, 0.15, 0.7])([r[0], FLARE]),
+        start=lambda r: around([0.28, 0.11, 0.16, 0.55, 0.17, 0.65])([r[0], FLARE]),
         constraints=near_ground,
         horizon=2.5,
     ),
