@@ -9,7 +9,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.continuous import ContinuousReferences
-from tests.certify.class_graphs import double_integrators
+from tests.certify.class_graphs import double_integrators, one_integrator
 
 
 @pytest.fixture(scope="module", params=[1, 2, 3])
@@ -83,3 +83,57 @@ def test_pairs_outside_the_classes_are_not_contained(case: tuple[int, Continuous
     assert not refs.contains([0.0] * (dim + 1), [0.0] * dim)
     assert not refs.contains(None, [0.0] * dim)
     assert not refs.decoupled
+
+
+def bent() -> mg.ModeGraph:
+    """Neither the middle of the starts nor the centre of the target is affine in the reference; R^ij is known."""
+    square = mg.Box([-1.0, -1.0], [1.0, 1.0])
+    bend = lambda r: np.stack([r[0] + 0.3 * np.sin(2.0 * r[1]), r[1] + 0.2 * r[0] ** 2])
+    first = one_integrator(bend, lambda r: mg.Box(bend(r) - 0.4, bend(r) + 0.4), square, "first")
+    second = one_integrator(bend, lambda r: mg.Ball(bend(r), 0.3), square, "second")
+    return mg.build([first, second], horizon=12.0)
+
+
+def swung() -> mg.ModeGraph:
+    """A pendulum held at any angle of a wide class: what is reached is curved in the reference."""
+    plant = mg.System(lambda x, u: np.array([x[1], -np.sin(x[0]) + u[0]]), states="a b", inputs="u")
+    modes = [
+        mg.Mode(
+            name, plant, controller=lambda x, r, kp=kp, kd=kd: -kp * (x[:1] - r) - kd * x[1:] + np.sin(r),
+            reference=mg.setpoint(mg.Box([-2.0], [2.0])), start=lambda r, size=size: mg.Ball([r[0], 0.0], size),
+        )
+        for name, kp, kd, size in (("first", 3.0, 1.5, 0.5), ("second", 9.0, 5.0, 0.25))
+    ]  # fmt: skip
+    return mg.build(modes, horizon=5.0)
+
+
+@pytest.mark.parametrize("make", [bent, swung])
+def test_cells_of_what_is_curved_hold_only_what_they_say(make: Any) -> None:
+    graph = make()
+    for i, j in (("first", "second"), ("second", "first")):
+        (relation,) = graph.references(i, j).relations.values()
+        rng = np.random.default_rng(4)
+        k = relation.source
+        # Near the diagonal, where something is certified, and all over.
+        centre = rng.uniform(-0.95, 0.95, (4000, k))
+        near = np.clip(centre + rng.uniform(-0.6, 0.6, centre.shape), -0.95, 0.95)
+        width = rng.uniform(0.0, 0.05, (4000, 1))
+        lo, hi = (centre - width, near - width), (centre + width, near + width)
+        yes, no = relation.cells(lo, hi)
+        assert yes.sum() > 50
+        assert no.sum() > 50
+        for _ in range(8):
+            source, target = (rng.uniform(a, b) for a, b in zip(lo, hi, strict=True))
+            assert relation.certified(source, target)[yes].all()
+            assert relation.refuted(source, target)[no].all()
+
+
+def test_the_volume_of_what_is_curved_is_proved_by_cells() -> None:
+    refs = swung().references("first", "second")
+    lower, upper = refs.volume
+    rng = np.random.default_rng(8)
+    source, target = rng.uniform(-2.0, 2.0, (2, 40_000, 1))
+    share = float((refs.statuses(source, target) == 1).mean()) * 16.0
+    assert 0.9 * share <= lower <= 1.03 * share
+    # A start rests at every reference: nothing farther than the radius .25 of the target can be certified.
+    assert upper <= 1.03 * (16.0 - (4.0 - 0.25) ** 2)

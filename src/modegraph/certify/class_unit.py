@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,21 +17,23 @@ from ..model.mode import Mode
 from ..model.sets.parametrised import ParametrisedSet
 from ..reach.chain import Chain, nonlinear_variable
 from ..reach.compiled import CompiledMode, compile_mode
-from ..reach.flow import Flow, Order
+from ..reach.flow import Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
 from ..reach.ladder import CURVED
 from ..reach.start import Chart, Piece
 from ..reach.tail import Tail, TailFailure, TailSearch
 from .crossing import proved_instants
-from .evidence import lasting, sampled_violation, slack_until, width_over_time
-from .moments import moments_of
+from .evidence import lasting, proved, proved_until, sampled_violation, slack_until, width_over_time
 from .proof import SafetyProof, certified_check, least_slack
-from .relation import Part, Relation, whole_relation
+from .refinement import Links
+from .relation import Relation
 from .target_class import TargetClass, target_class
 from .unit import TargetSpec
 from .verdict import Floats, Status, Verdict
 
 MOST_PARTS = 32
+LEAST_DEGREE, MOST_MONOMIALS = 3, 400
+"""Of the polynomials in the search for an invariant set."""
 DEEPEST = 7
 PROGRESS = 1.05
 """A cut must carry the constraints this much further, or it is the last one."""
@@ -57,54 +60,37 @@ def relate(
     horizon: float | None,
     deadline: float,
     progress: Callable[[str], None],
+    thorough: bool = False,
 ) -> ClassResult:
     """The relations from a mode - under one reference, or p = None for its whole class - to its targets.
 
     Parameters
     ----------
     horizon : seconds a switch may take; None: the duration of the reference and some more.
+    thorough : smaller parts of the starts are tried until the deadline, as long as they certify more
+        references.
     """
     compiled = compile_mode(mode, p)
     end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
     chains = _legal_chains(compiled, end, deadline, progress)
-    parameters = len(compiled.parameters)
     region = mode.reference.region if p is None else None
     rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None
-    relations: list[Relation | str] = []
-    for spec in targets:
-        try:
-            goal = target_class(spec.mode, spec.p, compiled.plant)
-        except ModegraphError as error:
-            relations.append(str(error))
-            continue
-        parts = [_part(chain, goal, end, parameters) for chain in chains]
-        relations.append(whole_relation(region, goal, parts, rest))
-    slack = least_slack(slack_until(flow, k) for chain in chains for flow, k in _proved(chain))
-    return ClassResult(relations, _check(compiled, chains), slack, end)
+    goals = [_goal(spec, compiled.plant) for spec in targets]
+    links = Links(compiled, region, [goal for goal in goals if isinstance(goal, TargetClass)], rest, end, chains)
+    if thorough:
+        links.refine(deadline, progress)
+    known = iter(links.relations)
+    relations = [goal if isinstance(goal, str) else next(known) for goal in goals]
+    slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
+    return ClassResult(relations, _check(compiled, links.chains), slack, end)
 
 
-def _part(chain: Chain, goal: TargetClass, end: float, parameters: int) -> Part | None:
-    moments = (moments_of(flow, goal, end, parameters) for flow, _ in _proved(chain))
-    found = [m for m in moments if m is not None]
-    return Part(tuple(found)) if found else None
-
-
-def _proved(chain: Chain) -> list[tuple[Flow, int]]:
-    """The flows of a chain as far as the constraints are proved, each with its last proved instant."""
-    found: list[tuple[Flow, int]] = []
-    for flow in chain.flows:
-        k = proved_instants(flow)
-        if k >= 0:
-            found.append((flow, k))
-        if k < len(flow.steps):
-            break
-    return found
-
-
-def _proved_until(chain: Chain) -> float:
-    """Seconds until which the constraints are proved; -1: not even at the start."""
-    found = _proved(chain)
-    return float(found[-1][0].times[found[-1][1]]) if found else -1.0
+def _goal(spec: TargetSpec, plant: int) -> TargetClass | str:
+    """A target of the relations, or why it cannot be one."""
+    try:
+        return target_class(spec.mode, spec.p, plant)
+    except ModegraphError as error:
+        return str(error)
 
 
 def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]) -> list[Chain]:
@@ -113,8 +99,8 @@ def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress:
     chains, _ = cutting.run()
     while len(chains) < MOST_PARTS and time.monotonic() < deadline:
         progress(f"{len(chains)} parts")
-        worst = min(chains, key=_proved_until)
-        until = _proved_until(worst)
+        worst = min(chains, key=proved_until)
+        until = proved_until(worst)
         if until >= min(end, worst.time) or (until >= 0.0 and sampled_violation(worst.flows[0])):
             break
         if worst.order.degree < CURVED:
@@ -124,7 +110,7 @@ def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress:
         children = [Chain(compiled, cutting.framed, half, order, deadline) for half in halves]
         for child in children:
             child.run(end)
-        further = min(map(_proved_until, children), default=np.inf) > PROGRESS * until
+        further = min(map(proved_until, children), default=np.inf) > PROGRESS * until
         if (until >= 0.0 and not further and len(halves) > 1) or worst.piece.depth >= DEEPEST:
             break
         chains = [chain for chain in chains if chain is not worst] + children
@@ -173,7 +159,7 @@ def _centre_in(mode: Mode, compiled: CompiledMode) -> list[Expr]:
 
 def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
     """Assumption 1 for the whole class: as far as the flows go, and for ever where a tail closes the time axis."""
-    until = min(map(_proved_until, chains))
+    until = min(map(proved_until, chains))
     last = compiled.fields[-1]
     widths = width_over_time(chains[0].flows[:1])
     if compiled.linear and not any(f.faces for f in compiled.fields) and until >= last.start:
@@ -198,7 +184,7 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         flow = chain.flows[-1]
         if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
             return TailFailure("the flowpipe ends before the loop has settled")
-        order = Order(1, 0) if compiled.linear else chain.order
+        order = Order(1, 0) if compiled.linear else _tail_order(chain)
         search = TailSearch(
             flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
         )
@@ -216,6 +202,14 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         np.max([tail.hi for tail in found], axis=0),
         min(tail.decay for tail in found),
     )
+
+
+def _tail_order(chain: Chain) -> Order:
+    """As high a degree as the flow has, within a size; a candidate set may have fewer variables, so no weights."""
+    degree = chain.order.degree
+    while degree > LEAST_DEGREE and math.comb(chain.piece.variables + degree, degree) > MOST_MONOMIALS:
+        degree -= 1
+    return Order(degree, min(degree - 1, chain.order.jacobian))
 
 
 def _own_chart(piece: Piece) -> Chart:

@@ -67,7 +67,7 @@ class ContinuousReferences:
     def __init__(self, source: Side, target: Side, relations: dict[tuple[int, int], Relation], same: bool) -> None:
         """``relations[a, b]``: of member a with member b (0 for a continuous class); ``same``: i = j."""
         self._source, self._target = source, target
-        self._relations = relations
+        self.relations = relations
         self._same = same
 
     # -- one pair --------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ class ContinuousReferences:
         left, right = _find(self._source, r_i), _find(self._target, r_j)
         if left is None or right is None:
             return False
-        relation = self._relations.get((left[0], right[0]))
+        relation = self.relations.get((left[0], right[0]))
         if relation is None or self._trivial(left[1], right[1])[0]:
             return False
         return bool(relation.certified(left[1], right[1])[0])
@@ -111,7 +111,7 @@ class ContinuousReferences:
                 f"statuses: give references (B, {wanted[0]}) of the source and (B, {wanted[1]}) of the target, "
                 f"not {source.shape} and {target.shape}"
             )
-        relation = self._relations.get(members)
+        relation = self.relations.get(members)
         if relation is None:
             return np.zeros(len(source), np.int64)
         known = np.ones(len(source), bool)
@@ -131,7 +131,7 @@ class ContinuousReferences:
         """
         rng = np.random.default_rng(seed)
         found: list[tuple[Parameter, Parameter]] = []
-        keys = list(self._relations)
+        keys = list(self.relations)
         shares = np.bincount(rng.integers(len(keys), size=n), minlength=len(keys)) if keys else np.zeros(0, int)
         for key, share in zip(keys, shares.tolist(), strict=True):
             if share:
@@ -159,14 +159,14 @@ class ContinuousReferences:
 
     def _gauges(self, key: tuple[int, int], z: Floats) -> Floats:
         source, target = self._split(z)
-        gauge = self._relations[key].crossings(source, target).gauge
+        gauge = self.relations[key].crossings(source, target).gauge
         gauge[self._trivial(source, target)] = np.inf
         return gauge
 
     def best(self, r_i: Floats | None, r_j: Floats | None) -> tuple[tuple[int, int], Floats, Floats, float] | None:
         """The closest pair found, with a reference kept where it is given: key, both, and the gauge."""
         found = []
-        for key in self._relations:
+        for key in self.relations:
             within = self._within(key, r_i, r_j)
             if within is not None:
                 z, gauge = self.closest(key, np.random.default_rng(1), 1, within)
@@ -176,7 +176,7 @@ class ContinuousReferences:
 
     def all_refuted(self, r_i: Floats | None, r_j: Floats | None) -> bool:
         """Whether every pair is proved refuted, with a reference kept where it is given."""
-        for key in self._relations:
+        for key in self.relations:
             within = self._within(key, r_i, r_j)
             if within is None:
                 continue
@@ -260,7 +260,7 @@ class ContinuousReferences:
     def cells(self) -> tuple[ProductCell, ...]:
         """Certified products, largest first; they need not cover R^ij, and a thin relation contains none."""
         found: list[ProductCell] = []
-        for key in self._relations:
+        for key in self.relations:
             k = self._source.dim if isinstance(self._source, Box) else 0
             boxes = self._certified_cells(key).boxes
             for lo, hi in sorted(boxes, key=lambda cell: -float(np.prod(cell[1] - cell[0]))):
@@ -276,7 +276,7 @@ class ContinuousReferences:
         self, key: tuple[int, int], most: int = MOST_CELLS, within: tuple[Floats, Floats] | None = None
     ) -> _Cells:
         """Cells of a box of joint parameters (lo, hi), by default of all; what is in none of them is refuted."""
-        relation = self._relations[key]
+        relation = self.relations[key]
         lo, hi = (side[None] for side in (self._bounds if within is None else within))
         found = _Cells([], 0.0, lo, hi)
         examined = 0
@@ -313,11 +313,11 @@ class ContinuousReferences:
     def decoupled(self) -> bool:
         """R^ij is proved to be a product: it does not depend on one of the references, or everything is certified."""
         members = [1 if isinstance(side, Box) else len(side) for side in (self._source, self._target)]
-        if self._same or not self._relations or len(self._relations) < members[0] * members[1]:
+        if self._same or not self.relations or len(self.relations) < members[0] * members[1]:
             return False
-        if members == [1, 1] and any(self._relations[0, 0].ignores):
+        if members == [1, 1] and any(self.relations[0, 0].ignores):
             return bool(self.closest((0, 0), np.random.default_rng(1), 1)[1][0] <= 1.0)
-        return all(self._covers(self._certified_cells(key)) for key in self._relations)
+        return all(self._covers(self._certified_cells(key)) for key in self.relations)
 
     def _covers(self, cells: _Cells) -> bool:
         """Whether certified boxes, cut out of the whole by halving, are all of it."""
@@ -335,7 +335,7 @@ class ContinuousReferences:
         nor refuted as a whole are sampled, every sample decided by proof: an estimate, off by about 1 %.
         """
         lower = upper = 0.0
-        for key, relation in self._relations.items():
+        for key, relation in self.relations.items():
             sharp = len(self._bounds[0]) <= FEW
             cells = self._certified_cells(key, MANY_CELLS if sharp else MOST_CELLS)
             left = np.prod(cells.hi - cells.lo, axis=1)
@@ -352,7 +352,7 @@ class ContinuousReferences:
         return lower, upper
 
     def __repr__(self) -> str:
-        return f"ContinuousReferences({len(self._relations)} relations)"
+        return f"ContinuousReferences({len(self.relations)} relations)"
 
 
 def _find(side: Side, r: Any) -> tuple[int, Floats] | None:

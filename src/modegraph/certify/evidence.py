@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expression.evaluate import Evaluator
+from ..reach.chain import Chain
 from ..reach.flow import Flow
 from ..reach.framing import generator_box
 from ..reach.tail import Tail
+from .crossing import proved_instants
 from .proof import SafetyProof, least_slack
 from .samples import sample_powers
 from .verdict import Widths
@@ -36,6 +38,24 @@ def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
     for name, value in zip(names, upper, strict=True):
         out[name] = min(-float(value), out.get(name, np.inf))
     return out
+
+
+def proved(chain: Chain) -> list[tuple[Flow, int]]:
+    """The flows of a chain as far as the constraints are proved, each with its last proved instant."""
+    found: list[tuple[Flow, int]] = []
+    for flow in chain.flows:
+        k = proved_instants(flow)
+        if k >= 0:
+            found.append((flow, k))
+        if k < len(flow.steps):
+            break
+    return found
+
+
+def proved_until(chain: Chain) -> float:
+    """Seconds until which the constraints are proved; -1: not even at the start."""
+    found = proved(chain)
+    return float(found[-1][0].times[found[-1][1]]) if found else -1.0
 
 
 def lasting(flows: Sequence[Flow], tail: Tail) -> SafetyProof:

@@ -38,14 +38,14 @@ def least(relation: Relation, source: tuple[Floats, Floats], target: tuple[Float
     nothing = np.full(shape, np.inf)
     if not relation.parts:
         return Least(nothing, nothing, nothing)
-    shift_lo, shift_hi, limits = relation.goal.over(*target)
+    shift_lo, shift_hi, _, limits = relation.goal.over(*target)
     gauge, latest, energy = np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape)
     for part in relation.parts:
         # A part that may have no starts for some of the references decides nothing.
         asked = _covers(part, *source)
         found, times, spent = [], [], []
         for flow in part.flows:
-            y_lo, y_hi = _rows_over(flow, *source)
+            y_lo, y_hi = flow.over(*source)
             low = y_lo[:, None] - shift_hi[None, :, None]
             high = y_hi[:, None] - shift_lo[None, :, None]
             found.append(_least_gauges(low, high, flow.spread, limits, relation.goal.round))
@@ -65,24 +65,6 @@ def least(relation: Relation, source: tuple[Floats, Floats], target: tuple[Float
 def _covers(part: Part, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
     first = part.flows[0]
     return np.asarray(((lo >= first.lo) & (hi <= first.hi)).all(axis=1))
-
-
-def _rows_over(flow: Moments, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
-    """Ranges (B, K, f) of the moments over boxes (B, k)."""
-    a, b = (lo - flow.middle) / flow.scale, (hi - flow.middle) / flow.scale
-    low, high = np.ones((len(lo), len(flow.exponents))), np.ones((len(lo), len(flow.exponents)))
-    for v in range(lo.shape[1]):
-        e = flow.exponents[:, v]
-        ends = a[:, [v]] ** e, b[:, [v]] ** e
-        least_power, most = np.minimum(*ends), np.maximum(*ends)
-        astride = (e > 0) & (e % 2 == 0) & (a[:, [v]] < 0.0) & (b[:, [v]] > 0.0)
-        least_power = np.where(astride, 0.0, least_power)
-        products = np.stack([low * least_power, low * most, high * least_power, high * most])
-        low, high = products.min(axis=0), products.max(axis=0)
-    up, down = np.maximum(flow.rows, 0.0), np.minimum(flow.rows, 0.0)
-    lowest = np.einsum("kfm,bm->bkf", up, low) + np.einsum("kfm,bm->bkf", down, high)
-    highest = np.einsum("kfm,bm->bkf", up, high) + np.einsum("kfm,bm->bkf", down, low)
-    return lowest, highest
 
 
 def _least_gauges(low: Floats, high: Floats, spread: Floats, limits: Floats, is_round: bool) -> Floats:
@@ -139,17 +121,22 @@ def strides(relation: Relation) -> Strides | None:
     if goal.affine is None or goal.region is None or not relation.parts:
         return None
     rows = goal.rows @ goal.affine[1]
-    whole = np.asarray(goal.region.lo, float)[None], np.asarray(goal.region.hi, float)[None]
-    part = relation.parts[0]
-    if not _covers(part, *whole).all():
-        return None
-    limits = goal.over(*whole)[2][0]
+    lo, hi = np.asarray(goal.region.lo, float)[None], np.asarray(goal.region.hi, float)[None]
+    limits = goal.over(lo, hi)[3][0]
     reach: list[Floats] = []
-    for flow in part.flows:
-        drift = _drift(flow, rows, goal.rows @ goal.affine[0], *whole)
+    # Every reference is in some part, and its steps are proved there.
+    flows = [flow for part in relation.parts for flow in part.flows]
+    for flow in flows:
+        drift = _drift(
+            flow,
+            rows,
+            goal.rows @ goal.affine[0],
+            np.maximum(lo, flow.lo),
+            np.maximum(np.minimum(hi, flow.hi), flow.lo),
+        )
         room = limits - flow.spread
         reach.append(room[:, 0] + np.sqrt((drift**2).sum(axis=1)) if goal.round else _opposite(goal.rows, room, drift))
-    times, energy = (np.concatenate([getattr(f, name) for f in part.flows]) for name in ("times", "energy"))
+    times, energy = (np.concatenate([getattr(f, name) for f in flows]) for name in ("times", "energy"))
     return Strides(rows, np.concatenate(reach), times, energy, goal.round)
 
 
@@ -166,7 +153,7 @@ def _drift(flow: Moments, rows: Floats, offset: Floats, lo: Floats, hi: Floats) 
             changed[:, :, own[0]] -= rows[:, v] * flow.scale[v]
         else:
             extra.append(np.abs(rows[:, v]) * np.abs(flow.scale[v]))
-    low, high = _rows_over(replace(flow, rows=changed), lo, hi)
+    low, high = replace(flow, rows=changed).over(lo, hi)
     return np.asarray(np.maximum(np.abs(low[0]), np.abs(high[0])) + sum(extra, np.zeros(len(rows))))
 
 

@@ -69,6 +69,23 @@ class Moments:
         """The moments do not depend on the reference, and this flow is for all of them."""
         return not self.rows[:, :, self.exponents.sum(axis=1) > 0].any() and self.whole
 
+    def over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
+        """Ranges (B, K, f) of y over boxes (B, k) of references, but for roundings of ROUNDED * size."""
+        a, b = (lo - self.middle) / self.scale, (hi - self.middle) / self.scale
+        low, high = np.ones((len(lo), len(self.exponents))), np.ones((len(lo), len(self.exponents)))
+        for v in range(lo.shape[1]):
+            e = self.exponents[:, v]
+            ends = a[:, [v]] ** e, b[:, [v]] ** e
+            least, most = np.minimum(*ends), np.maximum(*ends)
+            astride = (e > 0) & (e % 2 == 0) & (a[:, [v]] < 0.0) & (b[:, [v]] > 0.0)
+            least = np.where(astride, 0.0, least)
+            products = np.stack([low * least, low * most, high * least, high * most])
+            low, high = products.min(axis=0), products.max(axis=0)
+        up, down = np.maximum(self.rows, 0.0), np.minimum(self.rows, 0.0)
+        lowest = np.einsum("kfm,bm->bkf", up, low) + np.einsum("kfm,bm->bkf", down, high)
+        highest = np.einsum("kfm,bm->bkf", up, high) + np.einsum("kfm,bm->bkf", down, low)
+        return lowest, highest
+
 
 def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int) -> Moments | None:
     """The instants of a flow at which a switch may be proved; None where there is none."""
@@ -97,10 +114,12 @@ def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int)
         lo[k], hi[k] = flow.piece.unknown_range(int(flow.piece.uncertain[v - flow.piece.chart.free]))
         middle[k], scale[k] = scale_of(flow.piece, v)
         powers[:, k] = exponents[pure, v]
+    rows = np.einsum("fi,kij->kfj", target.rows, p[:, :, pure])
+    used = rows.any(axis=(0, 1)) | (powers.sum(axis=1) == 0)
     return Moments(
         lo, hi, all(flow.piece.lo[v] == -1.0 and flow.piece.hi[v] == 1.0 for v, _ in own),
-        flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers,
-        np.einsum("fi,kij->kfj", target.rows, p[:, :, pure]),
+        flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers[used],
+        np.ascontiguousarray(rows[:, :, used]),
         np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(flow, target, rest, G),
         float(np.abs(p).sum(axis=2).max() + max(np.abs(g).sum() for g in G)),
     )  # fmt: skip

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.pairs import first_crossings, part_gauges
+from ..enclosure.pairs import ROUNDED, first_crossings, part_gauges
 from ..model.sets import Box
 from .moments import Moments
 from .target_class import TargetClass
@@ -114,6 +114,12 @@ class Relation:
         limits = np.maximum(self.goal.at(self.goal.middle)[2][0], 1e-12)
         return (y - self.goal.rows @ c0) / limits, Y / limits[:, None], self.goal.rows @ C / limits[:, None]
 
+    @cached_property
+    def stays(self) -> bool:
+        """Of a class to itself: the mode ends where it starts, as at a set-point; else it carries the state along."""
+        _, Y, Z = self.arrival
+        return bool(np.abs(Y - Z).max(initial=0.0) <= 0.05 * np.abs(Z).max(initial=0.0))
+
     def crossings(self, source: Floats, target: Floats, quick: bool = False) -> Crossings:
         """Decide pairs: source (B, ki) and target (B, kj) references; outside their classes nothing is certified.
 
@@ -193,15 +199,13 @@ class Relation:
     def cells(
         self, lo: tuple[Floats, Floats], hi: tuple[Floats, Floats]
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which products of boxes (B, ki) x (B, kj) are certified, and which refuted, as a whole.
-
-        Where centre and moments are affine, gauges are convex in both references: largest at a corner.
-        """
-        joint_lo, joint_hi = np.concatenate(lo, axis=1), np.concatenate(hi, axis=1)
-        B = len(joint_lo)
+        """Which products of boxes (B, ki) x (B, kj) are certified, and which refuted, as a whole."""
         straight = self.goal.affine is not None and (self.rest is None or self.rest.affine is not None)
         if not straight or not all(f.affine for part in self.parts for f in part.flows):
-            return np.zeros(B, bool), np.zeros(B, bool)
+            return self._cells_by_ranges(lo, hi)
+        # Gauges are convex in both references: largest at a corner.
+        joint_lo, joint_hi = np.concatenate(lo, axis=1), np.concatenate(hi, axis=1)
+        B = len(joint_lo)
         z = corners(joint_lo, joint_hi)
         count = z.shape[1]
         flat = z.reshape(-1, z.shape[2])
@@ -216,6 +220,51 @@ class Relation:
         separated = self._separated(source, target).reshape(B, count, -1)
         refuted: NDArray[np.bool_] = np.logical_or.reduce(np.logical_and.reduce(separated, axis=1), axis=1)
         return certified, refuted
+
+    def _cells_by_ranges(
+        self, lo: tuple[Floats, Floats], hi: tuple[Floats, Floats]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Where something is curved: every term over the boxes."""
+        goal = self.goal
+        shift_lo, shift_hi, limits, _ = goal.over(lo[1], hi[1])
+        largest = np.abs(np.stack(goal.states_over(lo[1], hi[1]))).max(axis=(0, 2))
+        certified = np.full(len(lo[0]), bool(self.parts))
+        for part in self.parts:
+            best = np.full(len(lo[0]), np.inf)
+            for flow in part.flows:
+                low, high = flow.over(np.maximum(lo[0], flow.lo), np.minimum(hi[0], flow.hi))
+                error = (
+                    4.0 * ROUNDED * (flow.size + np.abs(high) + np.abs(low))
+                    + 4.0 * ROUNDED * (np.abs(shift_lo) + np.abs(shift_hi))[:, None]
+                )
+                error = error + ((flow.farthest + largest)[:, None] * goal.slack)[:, None]
+                best = np.minimum(best, _gauges(goal, low - shift_hi[:, None] - error,
+                                                high - shift_lo[:, None] + error, flow.spread, limits))  # fmt: skip
+            certified &= (best <= 1.0) | ~part.meets(lo[0], hi[0])
+        return certified, self._apart(lo, hi)
+
+    def _apart(self, lo: tuple[Floats, Floats], hi: tuple[Floats, Floats]) -> NDArray[np.bool_]:
+        """Products of boxes for which a resting start is proved outside S_j by one half-space."""
+        if self.rest is None:
+            return np.zeros(len(lo[0]), bool)
+        below, above = self.rest.states_over(lo[0], hi[0])
+        shift_lo, shift_hi, _, limits = self.goal.over(lo[1], hi[1])
+        rows = self.goal.rows
+        up, down = np.maximum(rows, 0.0), np.minimum(rows, 0.0)
+        size = np.abs(np.stack([below, above])).max(axis=0)
+        error = 8.0 * ROUNDED * (size @ np.abs(rows).T + np.abs(shift_lo) + np.abs(shift_hi))
+        error = (
+            error
+            + (size.sum(axis=1) + np.abs(np.stack(self.goal.states_over(lo[1], hi[1]))).sum(axis=(0, 2)))[:, None]
+            * self.goal.slack
+        )
+        least = below @ up.T + above @ down.T - shift_hi - error
+        if self.goal.round:
+            most = above @ up.T + below @ down.T - shift_lo + error
+            nearest = np.maximum(np.maximum(least, -most), 0.0)
+            length = np.sqrt((nearest**2).sum(axis=1)) * (1.0 - 1e-12)
+            return np.asarray(length > limits[:, 0] * self.goal.grow)
+        return np.asarray((least > limits * (1.0 + 1e-12)).any(axis=1))
 
     def _separated(self, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """For pairs (B,): by which of some fixed half-spaces (B, h) a resting start is proved outside S_j."""
@@ -232,6 +281,19 @@ class Relation:
         error = (blur + radius + 1e-12 * size) @ np.abs(rows).T
         error = error + size.sum(axis=1, keepdims=True) * self.goal.slack.max(initial=0.0)
         return np.asarray(y - error > limits * (1.0 + 1e-12))
+
+
+def _gauges(goal: TargetClass, low: Floats, high: Floats, spread: Floats, limits: Floats) -> Floats:
+    """(B,): the largest gauge over ranges (B, K, f) at the best instant."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if goal.round:
+            reach = np.sqrt((np.maximum(np.abs(low), np.abs(high)) ** 2).sum(axis=2)) * goal.grow * (1.0 + ROUNDED)
+            found = (reach + spread[:, 0]) * (1.0 + ROUNDED) / limits
+        else:
+            reach = high + spread
+            reach = reach + ROUNDED * np.abs(reach)
+            found = np.where(limits[:, None] > 0.0, reach / limits[:, None], np.inf).max(axis=2)
+    return np.asarray(np.where(np.isnan(found), np.inf, found).min(axis=1))
 
 
 def directions(n: int) -> Floats:

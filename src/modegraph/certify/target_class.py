@@ -70,20 +70,36 @@ class TargetClass:
         """c(p) = c0 + C p, (n,) and (n, k), where c is affine and the limits are fixed; None elsewhere."""
         return None if self._line is None else self._line[:2]
 
-    def over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats, Floats]:
-        """For planning: ranges (B, f) of rows c(p) over boxes (B, k) of references, and the largest limits."""
+    def over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Over boxes (B, k) of references: ranges (B, f) of rows c(p), the least and the largest limits (B, f or 1)."""
         if self._line is not None:
-            c0, C, _, _, high = self._line
-            slopes = self.rows @ C
-            middle, radius = 0.5 * (lo + hi) @ slopes.T + self.rows @ c0, 0.5 * (hi - lo) @ np.abs(slopes).T
-            return middle - radius, middle + radius, np.tile(high, (len(lo), 1))
-        low, top, _ = self._tape(np.ascontiguousarray(lo.T), np.ascontiguousarray(hi.T))
-        centre, reach = (0.5 * side[: self.dim].T for side in (low + top, top - low))
-        sizes = np.tile(self._limits, (len(lo), 1)) if len(top) == self.dim else np.maximum(top[self.dim :].T, 0.0)
-        if len(top) > self.dim and not self.round:
-            sizes = np.concatenate([sizes, sizes], axis=1)
-        about, radius = centre @ self.rows.T, reach @ np.abs(self.rows).T
-        return about - radius, about + radius, sizes
+            c0, C, _, low, high = self._line
+            middle = 0.5 * (lo + hi) @ C.T + c0
+            about = middle @ self.rows.T
+            slopes = np.abs(self.rows @ C)
+            reach = 0.5 * (hi - lo) @ slopes.T + self._lost(lo, hi) @ np.abs(self.rows).T
+            return about - reach, about + reach, np.tile(low, (len(lo), 1)), np.tile(high, (len(lo), 1))
+        below, above = self.states_over(lo, hi)
+        middle, radius = 0.5 * (below + above), 0.5 * (above - below)
+        about = middle @ self.rows.T
+        reach = (radius + 4.0 * ROUNDED * (np.abs(middle) + radius)) @ np.abs(self.rows).T
+        _, _, small, large = self._evaluated(lo, hi)
+        return about - reach, about + reach, small, large
+
+    def states_over(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
+        """Boxes (B, n) around the centres for boxes (B, k) of references."""
+        if self._line is not None:
+            c0, C, _, _, _ = self._line
+            middle, radius = 0.5 * (lo + hi) @ C.T + c0, 0.5 * (hi - lo) @ np.abs(C).T + self._lost(lo, hi)
+        else:
+            middle, radius, _, _ = self._evaluated(lo, hi)
+        return middle - radius, middle + radius
+
+    def _lost(self, lo: Floats, hi: Floats) -> Floats:
+        """(B, n): what an affine centre over boxes may be off by."""
+        assert self._line is not None
+        c0, C, off, _, _ = self._line
+        return off + 4.0 * ROUNDED * (np.maximum(np.abs(lo), np.abs(hi)) @ np.abs(C).T + np.abs(c0))
 
     @property
     def middle(self) -> Floats:
@@ -111,14 +127,14 @@ class TargetClass:
         slopes = derivative(exprs, self._centre.parameters)
         if not all(e.is_constant for row in slopes for e in row) or not all(e.is_constant for e in exprs[self.dim :]):
             return None
-        centre, radius, low, high = self._evaluated(np.zeros((1, self.parameters)))
+        centre, radius, low, high = self._evaluated(*[np.zeros((1, self.parameters))] * 2)
         C = np.array([[float(e.value) for e in row] for row in slopes[: self.dim]])
         return centre[0], C, radius[0], low[0], high[0]
 
-    def _evaluated(self, p: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Centres (B, n), what they may be off by, and limits from below and from above (B, f or 1), in intervals."""
+    def _evaluated(self, p: Floats, to: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Over boxes [p, to]: centres (B, n), what they may be off by, limits from below and above (B, f or 1)."""
         n = self.dim
-        low, high, _ = self._tape(np.ascontiguousarray(p.T), np.ascontiguousarray(p.T))
+        low, high, _ = self._tape(np.ascontiguousarray(p.T), np.ascontiguousarray(to.T))
         low, high = low.T, high.T
         centre = 0.5 * low[:, :n] + 0.5 * high[:, :n]
         radius = np.maximum(high[:, :n] - centre, centre - low[:, :n])
@@ -136,7 +152,7 @@ class TargetClass:
         S_j contains the set with these limits around the true centre; with ``outer`` it is contained in it.
         """
         if self._line is None:
-            centre, radius, low, high = self._evaluated(p)
+            centre, radius, low, high = self._evaluated(p, p)
             return centre, radius, high if outer else low
         c0, C, off, low, high = self._line
         found = affine_centres(np.ascontiguousarray(p, float), c0, C, off, high if outer else low)

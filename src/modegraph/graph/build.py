@@ -58,7 +58,8 @@ def build(
     progress : None, True or callable(done, total, text)
         True shows a bar in a terminal.
     budget : float, optional
-        Seconds of work; what is not decided then is UNDECIDED. By default 600.
+        Seconds of work; what is not decided then is UNDECIDED. By default 600. With a budget given, more of
+        it certifies more references of continuous classes.
 
     Returns
     -------
@@ -79,7 +80,9 @@ def build(
     modes = validate_modes(modes)
     units = _units(modes, horizon)
     with reporting(progress) as report:
-        results = _Work(units, report, DEFAULT_BUDGET if budget is None else float(budget)).run()
+        results = _Work(
+            units, report, DEFAULT_BUDGET if budget is None else float(budget), thorough=budget is not None
+        ).run()
     verdicts: dict[tuple[Node, Node], Verdict] = {}
     checks: dict[Node, Verdict] = {}
     links: dict[tuple[Node, Node], Link] = {}
@@ -165,7 +168,7 @@ def _is_class(mode: Mode | Target) -> bool:
     return isinstance(mode, Mode) and mode.reference.region is not None
 
 
-def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None]) -> _Result:
+def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None], thorough: bool) -> _Result:
     """Verdicts on the finite targets of a unit, and relations to the continuous ones."""
     finite: UnitResult | None = None
     if not _is_class(unit.mode):
@@ -175,7 +178,15 @@ def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None]) -> 
     if not unit.linked:
         assert finite is not None
         return _Result(finite, {})
-    found = relate(unit.mode, unit.parameter, unit.linked, horizon=unit.horizon, deadline=deadline, progress=progress)
+    found = relate(
+        unit.mode,
+        unit.parameter,
+        unit.linked,
+        horizon=unit.horizon,
+        deadline=deadline,
+        progress=progress,
+        thorough=thorough,
+    )
     return _Result(finite or UnitResult([], found.check), unit.links(found.relations, found.slack))
 
 
@@ -186,6 +197,8 @@ class _Work:
     units: Sequence[_Unit]
     report: Progress
     budget: float
+    thorough: bool = False
+    """Continuous classes are refined as long as there is time and it helps."""
     stopped: bool = False
     done: int = 0
     lock: Any = field(default_factory=Lock)
@@ -240,7 +253,7 @@ class _Work:
 
         try:
             with one_core():
-                return _examined(unit, deadline, progress)
+                return _examined(unit, deadline, progress, self.thorough)
         except (ModegraphError, _Stopped):
             raise
         except Exception as error:

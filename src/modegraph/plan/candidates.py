@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.continuous import ContinuousReferences
+from modegraph.certify.relation import Relation
 from modegraph.certify.target_class import target_class
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
@@ -36,7 +36,9 @@ STRIDES = np.concatenate([[1.0], 0.98 * 2.0 ** -np.arange(0.0, 10.0, 0.5)])
 FINER = (1.0, 1.5, 2.0, 3.0)
 """A walk is also tried in so many times the fewest steps, of equal length: short steps are quick."""
 MOST_WALKS = 12
-"""Walks from one question that are followed."""
+"""Walks that are followed for one question."""
+SHORT_WALK = 4.0
+"""Gauges of a start set: a walk that may be worth it where there is a way without."""
 
 
 class Proposals:
@@ -56,14 +58,19 @@ class Proposals:
             for route in self.routes.between(start.stop, goal.stop, avoid, via):
                 chains.append((route, _nodes(network, route, start, goal)))
         network.connect(pair for _, nodes in chains for pair in itertools.pairwise(nodes))
-        walks = 0
+        straight = False
+        walks: dict[tuple[Node, Node], float] = {}
         for route, nodes in chains:
             links = list(itertools.pairwise(nodes))
-            if not all(network.certified(*link) or route.walks(k) for k, link in enumerate(links)):
-                continue
-            for a, b in links:
-                if a[0] == b[0] and a != b and a[0] in self.graph.regions and walks < MOST_WALKS:
-                    walks += self._walk(network, a, b)
+            open_ = [k for k, link in enumerate(links) if link[0] != link[1] and not network.certified(*link)]
+            straight = straight or not open_
+            if all(route.walks(k) for k in open_):
+                for k in open_:
+                    walks[links[k]] = self._length(network, *links[k])
+        # Where some route does without, only a short walk may be worth it.
+        for a, b in sorted(walks, key=walks.__getitem__)[: 1 if straight else MOST_WALKS]:
+            if not straight or walks[a, b] <= SHORT_WALK:
+                self._walk(network, a, b)
 
     def everywhere(self, network: Network) -> None:
         """Propose a lattice of every class, and join everything that is certified."""
@@ -76,8 +83,16 @@ class Proposals:
         nodes = network.nodes()
         network.connect((a, b) for a in nodes for b in nodes)
 
-    def _walk(self, network: Network, source: Node, target: Node) -> bool:
-        """Propose steps on the line between two references of one class; whether that was new."""
+    def _length(self, network: Network, source: Node, target: Node) -> float:
+        """How far it is between two references of one class, in gauges of its start sets."""
+        relation = self.graph.references(source[0], source[0]).relations[0, 0]
+        a, b = network.parameter(source), network.parameter(target)
+        assert a is not None
+        assert b is not None
+        return float(np.abs(relation.arrival[2] @ (b - a)).max(initial=0.0))
+
+    def _walk(self, network: Network, source: Node, target: Node) -> None:
+        """Propose steps on the line between two references of one class."""
         name = source[0]
         a, b = network.parameter(source), network.parameter(target)
         assert a is not None
@@ -88,33 +103,31 @@ class Proposals:
             line = a + np.linspace(0.0, 1.0, count + 1)[1:-1, None] * (b - a)
             nodes = [source, *(network.propose(name, p) for p in line), target]
             network.connect(itertools.pairwise(nodes))
-        return True
 
     def _steps(self, name: str, a: Floats, b: Floats) -> int:
         """How many certified steps lead from a to b, as few as were found; 0: no way was found."""
-        refs = self.graph.references(name, name)
+        relation = self.graph.references(name, name).relations[0, 0]
         here = a
         for count in range(1, MOST_STEPS):
             ahead = here + STRIDES[:, None] * (b - here)
             ahead[0] = b
-            status = refs.statuses(np.repeat(here[None], len(ahead), axis=0), ahead)
-            good = np.flatnonzero(status == 1)
+            good = np.flatnonzero(relation.certified(np.repeat(here[None], len(ahead), axis=0), ahead))
             if not len(good):
                 return 0
             if good[0] == 0:
                 # Steps of equal length may be fewer.
-                while count > 1 and self._even(refs, a, b, count - 1):
+                while count > 1 and self._even(relation, a, b, count - 1):
                     count -= 1
                 return count
             here = ahead[good[0]]
         return 0
 
     @staticmethod
-    def _even(refs: ContinuousReferences, a: Floats, b: Floats, count: int) -> bool:
+    def _even(relation: Relation, a: Floats, b: Floats, count: int) -> bool:
         """Whether so many equal steps from a to b are all certified."""
         line = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
         line[-1] = b
-        return bool((refs.statuses(line[:-1], line[1:]) == 1).all())
+        return bool(relation.certified(line[:-1], line[1:]).all())
 
     def image(self, name: str, place: Floats) -> Floats | None:
         """The reference of a class whose start set is centred nearest to a place (least squares, clipped)."""

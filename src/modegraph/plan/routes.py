@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 MOST_ROUTES = 48
 MOST_STOPS = 7
+MOST_LEGS = 3
+"""Times in a row that a mode which carries the state is taken."""
 MOST_TRIED = 4000
 """Beginnings of routes looked at in one search."""
 STAYS = 0.1
@@ -38,7 +40,7 @@ PULL = 1e-4
 class Route:
     """Stops (mode, member of a finite class; 0 for a continuous one).
 
-    Two stops in the same continuous class are a walk: as many references between them as it takes.
+    Two stops in a row in the same class of set-points are a walk: as many references between them as it takes.
     """
 
     graph: ModeGraph
@@ -46,7 +48,7 @@ class Route:
 
     def walks(self, k: int) -> bool:
         """Whether the link behind stop k is a walk."""
-        return self.stops[k][0] == self.stops[k + 1][0]
+        return self.stops[k] == self.stops[k + 1] and _stays(self.graph, self.stops[k]) is True
 
     @cached_property
     def _blocks(self) -> list[slice]:
@@ -117,6 +119,14 @@ class Route:
         return self._solvers[key]
 
 
+def _stays(graph: ModeGraph, stop: Node) -> bool | None:
+    """Whether a continuous class ends where it starts; None where it has no certified switch to itself."""
+    link = graph.links.get((stop, stop))
+    if stop[0] not in graph.regions or link is None or not isinstance(link.relation, Relation):
+        return None
+    return link.relation.stays if link.relation.parts else None
+
+
 class Routes:
     """The routes of a graph, found once for every start and goal."""
 
@@ -145,7 +155,7 @@ class Routes:
         return self._found[key]
 
     def _stops(self, start: Node, goal: Node, avoid: frozenset[str], via: Sequence[str]) -> list[tuple[Node, ...]]:
-        """No stop twice, except that a walk may begin at one of them."""
+        """No stop twice, except that one may be walked at, and a mode that carries the state may be taken again."""
         far = self._distances(goal)
         found: list[tuple[Node, ...]] = []
         queue: deque[tuple[Node, ...]] = deque([(start,)])
@@ -153,7 +163,7 @@ class Routes:
         while queue and len(found) < MOST_ROUTES and tried < MOST_TRIED:
             stops = queue.popleft()
             tried += 1
-            walked = len(set(stops)) < len(stops)
+            walked = any(a == b and self._may_walk(a) for a, b in itertools.pairwise(stops))
             if stops[-1] == goal and (len(stops) > 1 or start == goal):
                 if set(via) <= {name for name, _ in stops}:
                     found.append(stops)
@@ -166,14 +176,19 @@ class Routes:
             for target in self._after.get(stops[-1], ()):
                 if target[0] in avoid or target not in far:
                     continue
-                again = target == stops[-1] and self._may_walk(target) and not walked
+                again = target == stops[-1] and (
+                    not walked if self._may_walk(target) else self._carries(target) and stops.count(target) < MOST_LEGS
+                )
                 closes = target == goal == start and len(stops) > 1 and target != stops[-1]
                 if again or closes or target not in stops:
                     queue.append((*stops, target))
         return found
 
     def _may_walk(self, stop: Node) -> bool:
-        return stop[0] in self.graph.regions and stop in self._after.get(stop, ())
+        return stop in self._after.get(stop, ()) and _stays(self.graph, stop) is True
+
+    def _carries(self, stop: Node) -> bool:
+        return stop in self._after.get(stop, ()) and _stays(self.graph, stop) is False
 
     def _distances(self, goal: Node) -> set[Node]:
         """Stops from which the goal may be reached."""

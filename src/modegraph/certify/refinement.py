@@ -1,0 +1,134 @@
+"""Smaller parts of the starts where that certifies more references: undecided regions shrink with the work spent."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.sets import Box
+from ..reach.chain import Chain, nonlinear_variable
+from ..reach.compiled import CompiledMode
+from .evidence import proved
+from .moments import moments_of
+from .relation import Part, Relation, whole_relation
+from .target_class import TargetClass
+
+Floats = NDArray[np.float64]
+
+SAMPLES = 1500
+"""Pairs of references at which relations are compared."""
+CHOICE = 16
+"""Targets drawn for each source."""
+WORTH = 0.01
+"""Share of the undecided pairs that a cut must decide."""
+SMALL = 0.01
+"""Share of all pairs that may stay undecided."""
+MOST_PARTS, DEEPEST = 64, 9
+
+
+@dataclass
+class Links:
+    """Chains that cover all starts, and what each can prove of each target.
+
+    Attributes
+    ----------
+    region : Box or None
+        The class of the source.
+    goals : the targets
+    rest : as in `Relation`
+    """
+
+    compiled: CompiledMode
+    region: Box | None
+    goals: Sequence[TargetClass]
+    rest: TargetClass | None
+    end: float
+    chains: list[Chain]
+
+    def __post_init__(self) -> None:
+        self._parts: dict[Chain, list[Part | None]] = {chain: self._proofs(chain) for chain in self.chains}
+
+    @property
+    def relations(self) -> list[Relation]:
+        """The relation to each target."""
+        return [
+            whole_relation(self.region, goal, [self._parts[chain][j] for chain in self.chains], self.rest)
+            for j, goal in enumerate(self.goals)
+        ]
+
+    def _proofs(self, chain: Chain) -> list[Part | None]:
+        return [part_of(chain, goal, self.end, len(self.compiled.parameters)) for goal in self.goals]
+
+    def refine(self, until: float, progress: Callable[[str], None]) -> None:
+        """Cut the starts until the instant ``until`` of ``time.monotonic()``, where it helps, worst part first."""
+        if not self.goals:
+            return
+        pairs = [self._pairs(relation, k) for k, relation in enumerate(self.relations)]
+        open_, failing = self._failing(pairs)
+        hopeless: set[Chain] = set()
+        while open_ > SMALL * SAMPLES * len(pairs) and len(self.chains) < MOST_PARTS and time.monotonic() < until:
+            candidates = [c for c in self.chains if c not in hopeless and c.shared == 0 and c.piece.depth < DEEPEST]
+            if not candidates:
+                return
+            worst = max(candidates, key=lambda chain: failing[chain])
+            if failing[worst] < WORTH * open_:
+                return
+            progress(f"{len(self.chains)} parts, {100.0 * open_ / (SAMPLES * len(pairs)):.0f} % of pairs undecided")
+            halves = worst.piece.split(nonlinear_variable(worst.flows[0]))
+            children = [Chain(self.compiled, worst.framed, half, worst.order, until) for half in halves]
+            for child in children:
+                child.run(self.end)
+                self._parts[child] = self._proofs(child)
+            before = self.chains
+            self.chains = [chain for chain in before if chain is not worst] + children
+            now, failing_now = self._failing(pairs)
+            if now > (1.0 - WORTH) * open_:
+                # Two variables may need a cut each, but then this one was not the first to cut.
+                self.chains = before
+                hopeless.add(worst)
+                continue
+            open_, failing = now, failing_now
+
+    def _fails(self, part: Part | None, goal: TargetClass, source: Floats, target: Floats) -> NDArray[np.bool_]:
+        """Pairs for which a part has starts and proves nothing."""
+        if part is None:
+            return np.ones(len(source), bool)
+        asked = part.meets(source, source)
+        return asked & ~Relation(self.region, goal, (part,), None).certified(source, target)
+
+    def _pairs(self, relation: Relation, seed: int) -> tuple[Floats, Floats]:
+        """Sources all over the class, each with the target of a few that is nearest to being certified."""
+        rng = np.random.default_rng(seed)
+        sides = (self.region, relation.goal.region)
+        count = SAMPLES * CHOICE
+        draws = [np.zeros((count, 0)) if s is None else rng.uniform(s.lo, s.hi, (count, s.dim)) for s in sides]
+        source = np.repeat(draws[0][:SAMPLES], CHOICE, axis=0)
+        gauge = relation.crossings(source, draws[1]).gauge.reshape(SAMPLES, CHOICE)
+        # Some near, some as they come.
+        best = np.where(np.arange(SAMPLES) % 3 == 0, 0, gauge.argmin(axis=1)) + CHOICE * np.arange(SAMPLES)
+        return source[best], draws[1][best]
+
+    def _failing(self, pairs: Sequence[tuple[Floats, Floats]]) -> tuple[int, dict[Chain, int]]:
+        """How many sampled pairs are undecided, and in how many of these each chain proves nothing."""
+        total = 0
+        failing = dict.fromkeys(self.chains, 0)
+        for j, (goal, (source, target)) in enumerate(zip(self.goals, pairs, strict=True)):
+            proofs = [self._parts[chain][j] for chain in self.chains]
+            alone = [self._fails(part, goal, source, target) for part in proofs]
+            refuted = Relation(self.region, goal, (), self.rest).refuted(source, target)
+            undecided: NDArray[np.bool_] = np.logical_or.reduce(alone) & ~refuted
+            total += int(undecided.sum())
+            for chain, fails in zip(self.chains, alone, strict=True):
+                failing[chain] += int((fails & undecided).sum())
+        return total, failing
+
+
+def part_of(chain: Chain, goal: TargetClass, end: float, parameters: int) -> Part | None:
+    """What the flows of a chain prove of a target; None where they have no usable instant."""
+    moments = (moments_of(flow, goal, end, parameters) for flow, _ in proved(chain))
+    found = [m for m in moments if m is not None]
+    return Part(tuple(found)) if found else None
