@@ -30,8 +30,6 @@ MOST_LEGS = 3
 """Times in a row that a mode which carries the state is taken."""
 MOST_TRIED = 4000
 """Beginnings of routes looked at in one search."""
-STAYS = 0.1
-"""A class moves, and is run twice instead of walked through, where it ends elsewhere than it begins by this share."""
 PULL = 1e-4
 """How strongly a reference is drawn to the middle of its class, where nothing else decides, for each gauge."""
 
@@ -64,12 +62,9 @@ class Route:
         h, H = [np.zeros(0)], [np.zeros((0, size))]
         for k, (source, target) in enumerate(itertools.pairwise(self.stops)):
             link = self.graph.links.get((source, target))
-            if link is None or not isinstance(link.relation, Relation):
+            if self.walks(k) or link is None or not isinstance(link.relation, Relation):
                 continue
             y, Y, Z = link.relation.arrival
-            if self.walks(k) and np.abs(Y - Z).max(initial=0.0) <= STAYS * np.abs(Z).max(initial=0.0):
-                # Any number of small steps leads from one reference to the other.
-                continue
             rows = np.zeros((len(y), size))
             rows[:, self._blocks[k]] = Y
             rows[:, self._blocks[k + 1]] = -Z
