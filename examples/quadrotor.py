@@ -1,7 +1,7 @@
 """Planar quadrotor in wind: hover, climb, cruise and land, each at any place; the planner chooses the places.
 
 The vehicle is the AscTec Hummingbird seen from the side. Every mode has a whole class of references: a hover at any
-point, a climb from any point by any height, a cruise along any level line, a descent at any place. Wind pushes in any
+point, a climb from any point to any height, a cruise along any level line, a descent at any place. Wind pushes in any
 way within its limits. The task is to get from a hover at one point to the ground at another.
 
     modegraph build    examples/quadrotor.py
@@ -33,8 +33,9 @@ quadrotor = mg.System(
     name="planar quadrotor",
 )
 
-POSITION, RATE = 3.8, 3.15  # across: 1/s^2, 1/s
-PITCH, PITCH_RATE = 150.0, 19.8  # attitude: 1/s^2, 1/s
+POSITION, RATE = np.array([3.8, 6.0]), np.array([3.15, 5.0])  # gains across and up: 1/s^2, 1/s
+PITCH, PITCH_RATE = 150.0, 19.8  # gains of the attitude: 1/s^2, 1/s
+SINK = 0.25  # m/s
 
 
 def rotors(x, ax, az):
@@ -44,39 +45,31 @@ def rotors(x, ax, az):
     return np.array([thrust + torque / ARM, thrust - torque / ARM]) / 2
 
 
-def follow(height, height_rate):
-    """Position control about r = (x, z), which may move, with these gains for the height."""
-
-    def controller(x, r):
-        ax = r.ddot[0] + RATE * (r.dot[0] - x[3]) + POSITION * (r[0] - x[0])
-        az = r.ddot[1] + height_rate * (r.dot[1] - x[4]) + height * (r[1] - x[1])
-        return rotors(x, ax, az)
-
-    return controller
-
-
-SINK = 0.25  # m/s
+def follow(x, r):
+    """Position control about r = (x, z), which may move."""
+    ax, az = r.ddot + RATE * (r.dot - x[3:5]) + POSITION * (r - x[:2])
+    return rotors(x, ax, az)
 
 
 def settle(x, r):
     """Hold the place r = (x,) and sink slowly until the legs touch."""
-    return rotors(x, POSITION * (r[0] - x[0]) - RATE * x[3], 8.0 * (-SINK - x[4]))
+    return rotors(x, POSITION[0] * (r[0] - x[0]) - RATE[0] * x[3], RATE[1] * (-SINK - x[4]))
 
 
 def in_flight(x, u):
     return {
-        "pitch": abs(x[2]) <= 0.6,  # rad
+        "pitch": abs(x[2]) <= 0.7,  # rad
         "speed": abs(x[3:5]) <= 3.5,  # m/s
-        "thrust": abs(u - 3.0) <= 2.8,  # N a rotor
+        "thrust": abs(u - 3.0) <= 2.95,  # N a rotor
         "ground": x[1] >= 0.0,  # m
     }
 
 
 def near_ground(x, u):
     return {
-        "pitch": abs(x[2]) <= 0.4,
-        "speed": abs(x[3:5]) <= [1.0, 0.5],
-        "thrust": abs(u - 3.0) <= 2.8,
+        "pitch": abs(x[2]) <= 0.7,
+        "speed": abs(x[3:5]) <= [1.5, 0.6],
+        "thrust": abs(u - 3.0) <= 2.95,
     }
 
 
@@ -97,8 +90,8 @@ def smooth(t, duration):
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-CRUISE, CLIMB, LAND = 5.0, 4.0, 4.0  # s
-FLARE = 0.12  # m above the ground, where a descent ends
+CRUISE, CLIMB, LAND = 6.0, 5.0, 4.0  # s
+FLARE = 0.15  # m above the ground, where a descent ends
 
 
 def level(t, p):
@@ -123,14 +116,15 @@ def on_the_ground():
     return A, np.array([0.0, 0.2, 0.2, 0.6, 0.6, 0.4])
 
 
-CALM = [0.3, 0.15, 0.18, 0.5, 0.22, 0.7]
 WIDE = [0.5, 0.3, 0.2, 0.7, 0.4, 0.8]
+CALM = [0.3, 0.15, 0.18, 0.55, 0.22, 0.7]
+LOW = [0.28, 0.11, 0.16, 0.55, 0.17, 0.65]
 
 modes = [
     mg.Mode(
         "hover",
         quadrotor,
-        controller=follow(6.0, 5.0),
+        controller=follow,
         reference=mg.setpoint(mg.Box([-6.0, 1.0], [6.0, 6.0])),
         start=around(WIDE),
         constraints=in_flight,
@@ -139,25 +133,25 @@ modes = [
     mg.Mode(
         "climb",
         quadrotor,
-        controller=follow(6.0, 5.0),
+        controller=follow,
         reference=mg.trajectory(vertical, CLIMB, over=mg.Box([-6.0, 1.0, 1.0], [6.0, 6.0, 6.0])),
         start=around(CALM),
         constraints=in_flight,
-        horizon=6.0,
+        horizon=6.5,
     ),
     mg.Mode(
         "cruise",
         quadrotor,
-        controller=follow(6.0, 5.0),
-        reference=mg.trajectory(level, CRUISE, over=mg.Box([-6.0, 1.0, -5.0], [6.0, 6.0, 5.0])),
+        controller=follow,
+        reference=mg.trajectory(level, CRUISE, over=mg.Box([-6.0, 1.0, -7.0], [6.0, 6.0, 7.0])),
         start=around(CALM),
         constraints=in_flight,
-        horizon=7.0,
+        horizon=7.5,
     ),
     mg.Mode(
         "land",
         quadrotor,
-        controller=follow(16.0, 8.0),
+        controller=follow,
         reference=mg.trajectory(descent, LAND, over=mg.Box([-6.0, 1.0], [6.0, 2.5])),
         start=around(CALM),
         constraints=in_flight,
@@ -168,7 +162,7 @@ modes = [
         quadrotor,
         controller=settle,
         reference=mg.setpoint(mg.Box([-6.0], [6.0])),
-        start=lambda r: around([0.3, 0.1, 0.18, 0.5, 0.15, 0.7])([r[0], FLARE]),
+        start=lambda r: around(LOW)([r[0], FLARE]),
         constraints=near_ground,
         horizon=2.5,
     ),
@@ -176,5 +170,6 @@ modes = [
 ]
 horizon = 5.0
 tasks = {
-    "deliver": {"start": "hover", "goal": "touchdown", "r_start": [-4.0, 2.0], "r_goal": [3.0], "minimize": "time"},
+    "deliver": {"start": "hover", "goal": "touchdown", "r_start": [-4.0, 5.0], "r_goal": [3.0], "minimize": "time"},
+    "give up": {"start": "hover", "goal": "landed", "r_start": [-4.0, 2.0], "minimize": "time"},
 }

@@ -60,3 +60,18 @@ def test_the_deadline_is_kept_and_what_is_there_is_used() -> None:
     assert isinstance(relation, Relation)
     assert not relation.crossings(np.zeros((1, 2)), np.full((1, 2), 0.4)).certified[0]
     assert found.check.until == pytest.approx(0.0, abs=0.5) or found.check.status is mg.Status.CERTIFIED
+
+
+def test_a_class_is_safe_for_ever_though_a_state_that_nobody_reads_drifts() -> None:
+    """The degrees of a class have a weight for each variable of its starts; the invariant set has fewer of them."""
+    plant = mg.System(
+        lambda x, u, w: np.array([x[1], -np.sin(x[0]) + u[0] + w[0], -0.2]), states="angle rate odometer",
+        inputs="torque", disturbance=mg.Box([-0.05], [0.05]),
+    )  # fmt: skip
+    mode = mg.Mode(
+        "held", plant, controller=lambda x, r: np.sin(r) - 4.0 * (x[:1] - r) - 3.0 * x[1:2],
+        reference=mg.setpoint(mg.Box([-0.5], [0.5])), start=lambda r: mg.Ball([r[0], 0.0, 0.0], 0.2),
+        constraints=lambda x: {"rate": abs(x[1]) <= 2.0},
+    )  # fmt: skip
+    check = related(mode, [mode]).check
+    assert check.status is mg.Status.CERTIFIED, check.reason

@@ -66,3 +66,23 @@ def test_a_lattice_joins_what_is_certified() -> None:
             assert p is not None
             assert q is not None
             assert network.certified(a, b) == graph.references("narrow", "wide").contains(p, q)
+
+
+def test_a_way_too_long_for_one_run_of_a_trajectory_takes_two() -> None:
+    """A move carries the state by at most 1; the goal is 1.8 away."""
+    plant = mg.System(lambda x, u: u, states="x", inputs="u")
+    stay = mg.Mode(
+        "stay", plant, controller=lambda x, r: 2.0 * (r - x), reference=mg.setpoint(mg.Box([-1.0], [1.0])),
+        start=lambda r: mg.Ball(r, 0.02),
+    )  # fmt: skip
+    move = mg.Mode(
+        "move", plant, controller=lambda x, r: r.dot + 2.0 * (r - x), start=lambda r: mg.Ball(r, 0.02),
+        reference=mg.trajectory(lambda t, p: p[:1] + p[1:] * t, 1.0, over=mg.Box([-1.0, -1.0], [1.0, 1.0])),
+    )  # fmt: skip
+    graph = mg.build([stay, move], horizon=3.0)
+    plan = graph.plan("stay", "stay", r_start=[-0.9], r_goal=[0.9])
+    assert plan.modes == ["stay", "move", "move", "stay"]
+    first, second = plan.references[1:3]
+    assert first is not None
+    assert second is not None
+    assert first[0] + first[1] == pytest.approx(second[0], abs=0.03)

@@ -10,10 +10,12 @@ import pytest
 import modegraph as mg
 from modegraph.enclosure.monomials import monomial_count
 from modegraph.reach import ladder
+from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.flow import Order
 from modegraph.reach.ladder import class_orders, is_light, orders
 from tests.reach.test_flowpipe import follower, van_der_pol
+from tests.soundness.examples import load
 from tests.soundness.families import oscillator, pendulum, pushed
 
 
@@ -68,3 +70,20 @@ def test_a_class_that_is_tight_at_once_keeps_the_lowest_degree() -> None:
 def test_a_disturbed_class_has_moderate_degrees() -> None:
     compiled = compiled_of(pushed().mode)
     assert max(o.degree for o in class_orders(compiled, compiled.whole(), 1.0)) <= ladder.MOST_DISTURBED
+
+
+def test_a_run_for_the_weights_ends_before_it_breaks_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The remainder of low degree soon feeds itself: hundreds of ever smaller steps would tell nothing more."""
+    compiled = compiled_of(load("quadrotor").modes[0])
+    probes: list[Chain] = []
+    advance = Chain.run
+
+    def run(self: Chain, *arguments: Any) -> bool:
+        probes.append(self)
+        return advance(self, *arguments)
+
+    monkeypatch.setattr(Chain, "run", run)
+    assert set(class_orders(compiled, compiled.whole(), 3.0)[0].weights) == {1, 2}
+    (probe,) = probes
+    assert not probe.failure
+    assert probe.time < 3.0

@@ -23,6 +23,8 @@ MOST_DISTURBED = 6
 CLASS_LADDER = ((5, 3), (6, 3), (7, 4), (8, 4), (9, 4), (10, 4))
 CLASS_MONOMIALS, CLASS_GENERATOR_MONOMIALS = 1600, 200
 """Of a class of references the first of these degrees is tried, and the highest with at most so many monomials."""
+FEEDING = 0.5
+"""Share of a remainder that comes from itself, at which the run that only finds the weights has shown enough."""
 STRAIGHT = 0.2
 """A variable counts twice where its nonlinear terms are smaller than this, relative to the geometric mean."""
 
@@ -65,7 +67,7 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
         return found
     probe = Chain(compiled, compiled.fields, piece, found[0])
     disturbed = bool(compiled.w_radius.any())
-    done = probe.run(end)
+    done = probe.run(end, _feeds_itself if disturbed else None)
     if done and not disturbed and not is_loose(probe):
         return found[:1]
     weights = _weights(probe)
@@ -78,6 +80,11 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
         rungs.append(Order(degree, jacobian, weights))
     low = disturbed or (done and not is_very_loose(probe))
     return [rungs[0], rungs[-1]] if low and len(rungs) > 1 else rungs[-2:]
+
+
+def _feeds_itself(chain: Chain) -> bool:
+    """Whether the remainder of a disturbed flow comes mostly from itself: it is about to break down in small steps."""
+    return chain.flows[-1].feedback > FEEDING
 
 
 def _weights(chain: Chain) -> tuple[int, ...]:
