@@ -82,11 +82,17 @@ class Relaxation:
             found[name, 0] = strides(link.relation) if link and isinstance(link.relation, Relation) else None
         return found
 
+    def _walks(self, node: Node) -> bool:
+        """Whether a class of set-points has certified switches to itself."""
+        link = self.graph.links.get((node, node))
+        relation = None if link is None else link.relation
+        return isinstance(relation, Relation) and bool(relation.parts) and relation.stays
+
     def switch(self, a: Cells, b: Cells) -> Least | None:
-        """Bounds of the switches from boxes to boxes; None where none is certified."""
+        """Bounds of the switches from boxes to boxes; None where none is certified, or walks stand for them."""
         link = self.graph.links.get((a.node, b.node))
         if link is not None:
-            if a.node == b.node or not isinstance(link.relation, Relation):
+            if not isinstance(link.relation, Relation) or (a.node == b.node and self._walks(a.node)):
                 return None
             return least(link.relation, (a.lo, a.hi), (b.lo, b.hi))
         verdict = self.graph.pair_verdicts().get((a.node, b.node))
@@ -186,10 +192,13 @@ class Relaxation:
         """Least cost of changing the reference within one class, by switches to itself."""
         if a.node[0] not in self.graph.regions:
             return np.zeros((1, 1))
+        if not self._walks(a.node):
+            return (
+                np.where(np.eye(len(a.lo), dtype=bool), 0.0, np.inf)
+                if a is b
+                else np.full((len(a.lo), len(b.lo)), np.inf)
+            )
         apart = _apart(a, b)
-        link = self.graph.links.get((a.node, a.node))
-        if link is None or not isinstance(link.relation, Relation) or not link.relation.parts:
-            return np.where(apart > 0.0, np.inf, 0.0)
         if wanted.travelled:
             return apart
         how = self._strides[a.node]
