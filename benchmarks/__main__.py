@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections import Counter
 from collections.abc import Sequence
 
 from . import measure, table
 from .cases import CASES
-from .figures import FIGURES, GOALS
+from .figures import CLASSES, FIGURES, GOALS
 
 
 def row(what: str, value: float, goal: tuple[float, str]) -> None:
     limit, unit = goal
-    mark = "" if value <= limit else "   over"
-    print(f"{what:44s} {value:9.2f} {unit:3s} goal {limit:g} {unit}{mark}")
+    asked = f" goal {limit:g} {unit}" if math.isfinite(limit) else ""
+    print(f"{what:44s} {value:9.2f} {unit:3s}{asked}{'' if value <= limit else '   over'}")
 
 
 def builds() -> None:
@@ -33,6 +34,20 @@ def builds() -> None:
     print()
 
 
+def questions() -> None:
+    """Plans for fresh references and look-ups in R^ij, with the graph in memory."""
+    nothing = float("inf")
+    for example, goals in CLASSES.items():
+        seen = measure.queries(example)
+        row(f"{example}: build", seen["build"], (goals.get("build", nothing), "s"))
+        for minimize in ("switches", "time"):
+            median, worst = (1e3 * seen[minimize][what] for what in ("median", "worst"))
+            row(f"{example}: plan, {minimize}, median", median, (goals.get("plan", nothing), "ms"))
+            print(f"    worst {worst:.2f} ms, {seen[minimize]['unreachable']} without a plan")
+        row(f"{example}: contains, median", 1e6 * seen["contains"], (goals.get("contains", nothing), "us"))
+    print()
+
+
 def flowpipes(words: Sequence[str]) -> None:
     print(table.HEADER)
     for case in CASES:
@@ -43,4 +58,5 @@ def flowpipes(words: Sequence[str]) -> None:
 if __name__ == "__main__":
     if len(sys.argv) == 1:
         builds()
+        questions()
     flowpipes(sys.argv[1:])

@@ -51,6 +51,16 @@ def build(example: str, *, cold: bool = False) -> dict[str, Any]:
     return {**json.loads(done.stdout.splitlines()[-1]), "total": total}
 
 
+def queries(example: str) -> dict[str, Any]:
+    """What `benchmarks.queries` measures, in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks.queries", example]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    if done.returncode:
+        raise RuntimeError(f"asking {example} failed:\n{done.stderr}")
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
 def import_seconds() -> float:
     """Best of five, without the start of Python itself."""
     code = "import time; t = time.perf_counter(); import modegraph; print(time.perf_counter() - t)"

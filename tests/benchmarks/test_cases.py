@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import modegraph as mg
-from benchmarks import measure, one, table
+from benchmarks import measure, one, queries, table
 from benchmarks.case import Case
 from benchmarks.cases import CASES
 from benchmarks.figures import FIGURES, Figures
 from benchmarks.spread import sampled_spread
 from modegraph.model.closed_loop import close_loop
+from tests.certify.class_graphs import double_integrators
 
 BY_NAME = {case.name: case for case in CASES}
 
@@ -113,3 +115,13 @@ def test_a_build_is_measured_in_a_process_of_its_own() -> None:
     assert set(run["statuses"]) <= {"certified", "refuted", "undecided"}
     assert run["total"] > run["seconds"] > 0.0
     assert run["megabytes"] > 10.0
+
+
+def test_questions_are_measured_on_any_graph_of_classes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(queries, "load", lambda name: SimpleNamespace(modes=double_integrators(1), horizon=20.0))
+    monkeypatch.setattr(queries, "QUESTIONS", 3)
+    monkeypatch.setitem(queries.ASKED, "line", ("wide", "narrow"))
+    seen = queries.measure("line")
+    assert seen["contains"] > 0.0
+    assert seen["time"]["worst"] >= seen["time"]["median"] > 0.0
+    assert seen["switches"]["unreachable"] == 0
