@@ -58,9 +58,10 @@ def plot_references(refs: ContinuousReferences, ax: Any, r_i: Any, r_j: Any, dim
         for s, (name, (_, p)) in enumerate(zip(("r_i", "r_j"), at, strict=True))
         if len(p) and not any(side == s for side, _ in axes)
     ]
-    other = 1 - axes[0][0]
-    if kept and len(at[other][1]) >= len(axes) == 2:
-        ax.plot(*at[other][1][[k for _, k in axes]], "k+", markersize=10)
+    side = axes[0][0]
+    if kept and len(at[0][1]) == len(at[1][1]) and len(axes) == 2:
+        # The other's reference, where both are points of one space.
+        ax.plot(*at[1 - side][1][[k for _, k in axes]], "k+", markersize=10)
     shown = [s for s in (1, 0, -1) if (status == s).any()]
     ax.legend(handles=[Patch(color=COLOURS[s][0], alpha=0.75, label=COLOURS[s][1]) for s in shown], fontsize=8)
     ax.set_title(", ".join(kept), fontsize=9)
