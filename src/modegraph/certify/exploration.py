@@ -42,6 +42,9 @@ SETTLING = 4.0
 TOO_MUCH_FEEDBACK = 0.5
 WORTH_A_TAIL = 0.7
 """An invariant set is looked for again when the reach set is smaller by this factor."""
+STALLED = 0.98
+"""A gauge that shrinks by less than this from one look to the next does so no more. Before that no invariant set is
+looked for under a disturbance: a flow that is enclosed again first would not use it."""
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
@@ -281,7 +284,9 @@ class Exploration:
             self.tick(f"t = {flow.time:.3g} s")
             now = {j: self._gauge_now(flow, j) for j in pending}
             pending = [j for j in pending if not now[j] <= 1.0]
-            if tail is None and flow.time >= start and (size := set_size(flow)) < WORTH_A_TAIL * tried:
+            stalled = all(now[j] > STALLED * previous[j] for j in pending)
+            early = park and not stalled and not self.linear and bool(self.w_radius.any())
+            if tail is None and flow.time >= start and not early and (size := set_size(flow)) < WORTH_A_TAIL * tried:
                 tried = size
                 search = TailSearch(
                     flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
@@ -300,7 +305,7 @@ class Exploration:
             if not pending and (tail is not None or not safety):
                 break
             settled = tail is not None and np.isfinite(decay) and flow.time > tail.start + SETTLING / decay
-            if settled and all(now[j] > 0.98 * previous[j] for j in pending):
+            if settled and stalled:
                 sinking = self._sink(flow, pending)
                 if isinstance(sinking, Sinking) and any(self._arrives(sinking, j) for j in pending):
                     tail = sinking
