@@ -20,7 +20,7 @@ SIZE = int(TABLE.start[Q + 1])
 STIFF = np.array([[0.0, 0.0, 1.0], [1.0, -2.0, 0.0], [-20.0, 7.0, -30.0]])
 PLACES = [*product((-1.0, 1.0), repeat=2), (0.3, -0.8)]
 SCALES = [1e-3, 0.1, 1.0]
-K = 40
+K = 12
 """Pieces of a signal during the step."""
 
 
@@ -41,7 +41,7 @@ def loop(seed: int, n: int, scale: float) -> tuple[Any, Any, Any]:
 @pytest.mark.parametrize("h", [0.01, 0.1])
 def test_the_terms_of_the_exponential(scale: float, h: float) -> None:
     n = 3
-    for seed in range(6):
+    for seed in range(4):
         J, dJ, nJ = loop(seed, n, scale)
         v = np.random.default_rng(seed + 50).normal(size=(n, SIZE))
         images, sizes, missed, beyond = exponential_terms(J, dJ, nJ, v, h, Q, TABLE.pairs, *TABLE.arrays)
@@ -79,7 +79,7 @@ def test_a_push_at_any_time(scale: float, h: float) -> None:
     n = 3
     rng = np.random.default_rng(1)
     x = np.linspace(0.0, 1.0, K)
-    for seed in range(6):
+    for seed in range(4):
         J, dJ, nJ = loop(seed, n, scale)
         chords, strays, tops = push_columns(J, dJ, nJ, n, h, Q, TABLE.pairs, *TABLE.arrays)
         for xi in PLACES:
@@ -95,7 +95,7 @@ def test_a_push_at_any_time(scale: float, h: float) -> None:
                 middle, half = (chords[c] @ at)[0], (chords[c] @ at)[1]
                 # |a + b| + |a - b| <= 2 for the sums of the masses and of the masses times 2 x - 1.
                 a, b = mass.sum(), mass @ (2.0 * x - 1.0)
-                assert abs(a) <= 1 + 1e-12 and abs(b) <= 1 + 1e-12
+                assert max(abs(a), abs(b)) <= 1 + 1e-12
                 assert (np.abs(end - a * middle - b * half) <= strays[:, c] * (1 + 1e-9) + 1e-12).all()
 
 
@@ -106,10 +106,10 @@ def test_a_switched_disturbance(scale: float, h: float) -> None:
     rng = np.random.default_rng(2)
     radius = np.array([0.3, 1.5])
     # Gauss points of each piece: exact for the powers, and nearly so for the exponential.
-    nodes, weights = np.polynomial.legendre.leggauss(6)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
     x = ((np.arange(K)[:, None] + 0.5 + 0.5 * nodes) / K).ravel()
     dx = np.tile(0.5 * weights / K, K)
-    for seed in range(6):
+    for seed in range(4):
         J, dJ, nJ = loop(seed, n, scale)
         B = rng.normal(size=(nw, n, SIZE))
         columns, outside, speed = disturbance_columns(J, dJ, nJ, B, radius, h, Q, TABLE.pairs, *TABLE.arrays)

@@ -15,7 +15,7 @@ from ..expression.tape import Tape
 from ..reach.chain import nonlinear_variable
 from ..reach.decay import SettledLoop
 from ..reach.field import Field
-from ..reach.flow import RESTART_STEPS, Flow, Order
+from ..reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
 from ..reach.framing import generator_box
 from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
@@ -43,8 +43,9 @@ TOO_MUCH_FEEDBACK = 0.5
 WORTH_A_TAIL = 0.7
 """An invariant set is looked for again when the reach set is smaller by this factor."""
 STALLED = 0.98
-"""A gauge that shrinks by less than this from one look to the next does so no more. Before that no invariant set is
-looked for under a disturbance: a flow that is enclosed again first would not use it."""
+"""A gauge that shrinks by less than this from one look to the next does so no more."""
+IDLE_LOOKS = 4
+"""Such looks in a row until an invariant set is looked for although targets are open, under a disturbance."""
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
@@ -262,6 +263,8 @@ class Exploration:
         pending = list(wanted)
         checkpoint = 8
         tried = np.inf
+        idle = 0
+        disturbed = not self.linear and bool(self.w_radius.any())
         taken = len(flow.steps)
         while flow.time < end and time.monotonic() < self.deadline:
             if not flow.advance(end):
@@ -285,8 +288,11 @@ class Exploration:
             now = {j: self._gauge_now(flow, j) for j in pending}
             pending = [j for j in pending if not now[j] <= 1.0]
             stalled = all(now[j] > STALLED * previous[j] for j in pending)
-            early = park and not stalled and not self.linear and bool(self.w_radius.any())
-            if tail is None and flow.time >= start and not early and (size := set_size(flow)) < WORTH_A_TAIL * tried:
+            idle = idle + 1 if stalled else 0
+            # Enclosed again, a flow would go on without what was found.
+            passing = park and pending and disturbed and (flow.feedback >= RESTART_FEEDBACK or idle < IDLE_LOOKS)
+            size = set_size(flow)
+            if tail is None and flow.time >= start and not passing and size < WORTH_A_TAIL * tried:
                 tried = size
                 search = TailSearch(
                     flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
