@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cores import in_parallel
+from ..enclosure.monomials import monomial_count
 from ..expression.tape import Tape
 from ..reach.chain import nonlinear_variable
 from ..reach.decay import SettledLoop
 from ..reach.field import Field
 from ..reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
-from ..reach.framing import generator_box
 from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
 from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
-from .evidence import sampled_violation, slack_until
+from .evidence import sampled_violation, set_size, slack_until
 from .findings import Findings, better, merge, settle
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
@@ -108,9 +108,9 @@ class Exploration:
         if self.linear or m == 0:
             return Order(1, 0)
         degree, jacobian = LADDER[effort]
-        while degree > 3 and _count(m, degree) > MOST_MONOMIALS:
+        while degree > 3 and monomial_count((1,) * m, degree) > MOST_MONOMIALS:
             degree -= 1
-        while jacobian > 1 and _count(m, jacobian) > MOST_GENERATOR_MONOMIALS:
+        while jacobian > 1 and monomial_count((1,) * m, jacobian) > MOST_GENERATOR_MONOMIALS:
             jacobian -= 1
         return Order(degree, min(jacobian, degree - 1))
 
@@ -489,19 +489,3 @@ class Exploration:
         k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
         by = f"exceeded by up to {upper[k]:.3g}" if np.isfinite(upper[k]) else "not defined on the whole set"
         return f"constraint '{names[k]}' cannot be proved {when} ({by})"
-
-
-def set_size(flow: Flow) -> float:
-    """Half-width of the last set of a flow, in the state where it is largest relative to the starts (floats)."""
-    p, G = flow.state_set(len(flow.steps))
-    start, slack = flow.state_set(0)
-    own = np.abs(start[:, 1:]).sum(axis=1) + generator_box(slack)
-    now = np.abs(p[:, 1:]).sum(axis=1) + generator_box(G)
-    return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))
-
-
-def _count(m: int, degree: int) -> int:
-    count = 1
-    for k in range(1, degree + 1):
-        count = count * (m + k) // k
-    return count
