@@ -223,9 +223,9 @@ def flow_step(
     W = A0
     F = np.zeros((n, n, Nq))
     columns = np.zeros((nw, 3, n, Nq))
-    chords = np.zeros((n, 2, n, Nq))
-    strays = A0
-    tops = A0
+    chords = np.zeros((0, 2, n, Nq))
+    strays = np.zeros((n, n))
+    tops = strays
     outside = nothing
     miss_b = nothing
     c_total = nothing
@@ -269,7 +269,8 @@ def flow_step(
         columns, outside, u = disturbance_columns(
             J, dJ, nJ, B, radius, h, q, pairs, product, offset, start, degree
         )  # fmt: skip
-        chords, strays, tops = push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree)
+        if nw > 0:
+            chords, strays, tops = push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree)
         H_end, dropped = advance_generators(F, G, q, pairs, product, offset, start, degree)
         for i in range(n):
             for k in range(n):
@@ -339,17 +340,21 @@ def flow_step(
                 for k in range(n):
                     s += E[r, k] * z[k]
                 control[4] = max(control[4], s / (s + defect[r] + u[r] + TINY))
-            # What c brings follows J at s = 0 as u does; what that misses is pushed again.
-            reached = matrix_product(tops, c_total.reshape(n, 1)) * UP
-            again = np.zeros(n)
-            for r in range(n):
-                for k in range(n):
-                    moved = RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k])
-                    for i in range(1, KJ + 1):
-                        for d in range(q + 1):
-                            moved += nJ[r * n + k, i, d] / (i + 1)
-                    again[r] += h * moved * reached[k, 0]
-            again = again * UP + TINY
+            # With a disturbance c is large. What it brings then follows J at s = 0 as u does, and what that
+            # misses is pushed again.
+            reached = np.zeros((n, 1))
+            again = c_total
+            if nw > 0:
+                reached = matrix_product(tops, c_total.reshape(n, 1)) * UP
+                again = np.zeros(n)
+                for r in range(n):
+                    for k in range(n):
+                        moved = RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k])
+                        for i in range(1, KJ + 1):
+                            for d in range(q + 1):
+                                moved += nJ[r * n + k, i, d] / (i + 1)
+                        again[r] += h * moved * reached[k, 0]
+                again = again * UP + TINY
             W_again = matrix_product(W, again.reshape(n, 1))[:, 0] * UP
             WD = matrix_product(W, D) * UP
             control[2] = spectral_radius(h * WD)
@@ -412,15 +417,19 @@ def flow_step(
     for i in range(n):
         box[i] = (box[i] + outside[i]) * UP
     old = H_end.shape[0]
-    grown = np.zeros((old + 3 * n + 3 * nw, n, Nq))
+    carried = chords.shape[0]
+    fresh = 2 * carried + 3 * nw
+    grown = np.zeros((old + n + fresh, n, Nq))
     grown[:old] = H_end
     for i in range(n):
         grown[old + i, i, 0] = (box[i] + dropped[i]) * UP + TINY
+    for i in range(carried):
         grown[old + n + 2 * i : old + n + 2 * i + 2] = c_total[i] * chords[i]
     for j in range(nw):
-        grown[old + 3 * n + 3 * j : old + 3 * n + 3 * j + 3] = columns[j]
+        row = old + n + 2 * carried + 3 * j
+        grown[row : row + 3] = columns[j]
     if grown.shape[0] > most:
-        grown = reduce_generators(grown, most - 4 * n - 3 * nw)
+        grown = reduce_generators(grown, most - 2 * n - fresh)
     time_error = 0.0
     other = 0.0
     for i in range(n):
