@@ -45,7 +45,7 @@ WORTH_A_TAIL = 0.7
 STALLED = 0.98
 """A gauge that shrinks by less than this from one look to the next does so no more."""
 IDLE_LOOKS = 4
-"""Such looks in a row until an invariant set is looked for although targets are open, under a disturbance."""
+"""Such looks in a row until an invariant set is looked for, where a flow may be enclosed again before."""
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
@@ -290,7 +290,8 @@ class Exploration:
             stalled = all(now[j] > STALLED * previous[j] for j in pending)
             idle = idle + 1 if stalled else 0
             # Enclosed again, a flow would go on without what was found.
-            passing = park and pending and disturbed and (flow.feedback >= RESTART_FEEDBACK or idle < IDLE_LOOKS)
+            patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 1
+            passing = park and pending and disturbed and idle < patience
             size = set_size(flow)
             if tail is None and flow.time >= start and not passing and size < WORTH_A_TAIL * tried:
                 tried = size
