@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+from threadpoolctl import threadpool_info
 
 from modegraph import cores
 
@@ -37,3 +38,13 @@ def test_an_error_reaches_the_caller_and_gives_the_core_back(monkeypatch: pytest
     with pytest.raises(ValueError, match="of this task"):
         list(cores.in_parallel([lambda: 1, fails]))
     assert cores._FREE.acquire(timeout=20.0)
+
+
+def test_algebra_on_one_thread_for_as_long_as_asked() -> None:
+    def threads() -> list[int]:
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    before = threads()
+    with cores.single_threaded_algebra():
+        assert set(threads()) == {1}
+    assert threads() == before

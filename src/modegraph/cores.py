@@ -22,6 +22,18 @@ def one_core() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def single_threaded_algebra() -> Iterator[None]:
+    """NumPy's matrix products on the core of their caller, for work that keeps all cores busy by itself.
+
+    Helper threads that wait for the next small product took a third of all processor time.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
 def in_parallel(tasks: Sequence[Callable[[], Result]]) -> Iterator[Result]:
     """Results in order; tasks after the first run on cores that are free, or else when it is their turn.
 

@@ -99,3 +99,19 @@ def test_a_push_where_the_units_of_the_states_differ() -> None:
     moved = np.abs(G).sum(axis=(0, 2))
     assert moved[1] <= 1.1 * 0.1 * h
     assert (moved <= [1e-4, 1.0, 1e-3, 0.2]).all()
+
+
+@pytest.mark.parametrize("h", [0.05, 0.1])
+def test_a_push_that_a_rising_slope_carries_on(h: float) -> None:
+    """x' = 5 y^2 x + w with y' = 8 from 0: the slope is 0 at first, w = 1 moves x further than h."""
+    flow = new_flow(
+        lambda x, u, w: np.array([8.0 + 0.0 * x[0], 5.0 * x[0] ** 2 * x[1] + w[0]]),
+        mg.Box([0.0, 0.0], [0.0, 0.0]), Order(4, 3), mg.Box([-1.0], [1.0]),
+    )  # fmt: skip
+    status, _, _, G, tube, _, _, _ = flow._attempt(flow.fields[0], h)
+    assert status == DONE
+    s = np.linspace(0.0, h, 20001)
+    rise = 320.0 / 3.0 * (h**3 - s**3)
+    reached = np.trapezoid(np.exp(rise), s)
+    assert reached <= np.abs(G[:, 1]).sum() < 1.1 * reached
+    assert tube[1] >= reached

@@ -9,7 +9,8 @@ import pytest
 from flint import arb, ctx
 
 from modegraph.enclosure import rounding
-from modegraph.enclosure.disturbance import SIGMA_2
+from modegraph.enclosure.disturbance import MEAN, SLOPE, STRAY
+from modegraph.enclosure.exponential import POWERS
 from modegraph.enclosure.rounding import LIBM, MAX_PRODUCTS, MAX_ROUNDINGS, TINY, UNIT, UP, gamma
 from modegraph.enclosure.variational import chord_distance
 
@@ -56,11 +57,31 @@ def test_the_library_keeps_to_libm(x: float) -> None:
             assert not abs(arb(floats(x)) - true) > size * LIBM + TINY
 
 
-def test_sigma_2() -> None:
-    with ctx.workprec(200):
-        true = arb(2) / (9 * arb(3).sqrt())
-        assert true < arb(SIGMA_2)
-        assert not true < arb(SIGMA_2) / 2
+@pytest.mark.parametrize("k", range(POWERS + 1))
+def test_powers_stray_from_their_lines(k: int) -> None:
+    """x^k / k! - MEAN - SLOPE (x - 1/2) is convex: positive, negative, positive. Its mean is 0."""
+    mean, slope = Fraction(1, math.factorial(k + 1)), Fraction(6 * k, math.factorial(k) * (k + 1) * (k + 2))
+    assert abs(Fraction(MEAN[k]) - mean) <= mean / 2**52
+    assert abs(Fraction(SLOPE[k]) - slope) <= slope / 2**52
+    if k < 2:
+        return
+
+    def off(x: Fraction) -> Fraction:
+        return x**k / math.factorial(k) - mean - slope * (x - Fraction(1, 2))
+
+    def integral(x: Fraction) -> Fraction:
+        return x ** (k + 1) / math.factorial(k + 1) - mean * x - slope * (x**2 - x) / 2
+
+    low = min((Fraction(j, 64) for j in range(65)), key=off)
+    roots = []
+    for inside, outside in ((low, Fraction(0)), (low, Fraction(1))):
+        for _ in range(60):
+            middle = (inside + outside) / 2
+            inside, outside = (inside, middle) if off(middle) > 0 else (middle, outside)
+        roots.append(inside)
+    # The negative part is half of the whole.
+    true = 2 * (integral(roots[0]) - integral(roots[1]))
+    assert true < Fraction(STRAY[k]) < Fraction(11, 10) * true
 
 
 @pytest.mark.parametrize("j", range(2, 13))

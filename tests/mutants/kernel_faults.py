@@ -9,6 +9,7 @@ OPERATIONS = "tests/enclosure/test_operations.py"
 STEP = "tests/enclosure/test_step.py"
 REMAINDER = "tests/enclosure/test_remainder_of_a_step.py"
 GENERATORS = "tests/enclosure/test_generators.py"
+EXPONENTIAL = "tests/enclosure/test_exponential.py"
 
 KERNEL_FAULTS = (
     Fault(
@@ -182,15 +183,71 @@ KERNEL_FAULTS = (
     Fault(
         "the columns of the disturbance are ignored",
         "enclosure/disturbance.py",
-        "first[j, i, l] = h * radius[j] * (B[j, i, l] + image[i, l] / 2.0 + again[i, l] / 6.0)",
-        "first[j, i, l] = 0.0",
+        "columns[j, 0, i, l] += weight * MEAN[k] * images[k, i, l]",
+        "columns[j, 0, i, l] = 0.0",
         (STEP,),
     ),
     Fault(
-        "the disturbance has no rest beyond its two columns",
+        "the disturbance has no rest beyond its columns",
         "enclosure/disturbance.py",
-        "            s = rest + high[i]\n",
-        "            s = 0.0\n",
+        "            outside[i] += weight * s * UP + TINY\n",
+        "            outside[i] += TINY\n",
+        (EXPONENTIAL,),
+    ),
+    Fault(
+        "the disturbance moves the error half as fast",
+        "enclosure/disturbance.py",
+        "            speed[i] += weight * t * UP + TINY\n",
+        "            speed[i] += 0.5 * weight * t * UP + TINY\n",
+        (EXPONENTIAL,),
+    ),
+    Fault(
+        "higher powers of the exponential are left out",
+        "enclosure/exponential.py",
+        "        beyond[i] = (beyond[i] + tail) * UP + TINY\n",
+        "        beyond[i] = TINY\n",
+        (EXPONENTIAL,),
+    ),
+    Fault(
+        "what a power of the exponential misses is not carried on",
+        "enclosure/exponential.py",
+        "s += Y[i, c] * (missed[k - 1, c] + gamma * sizes[k - 1, c])",
+        "s += Y[i, c] * gamma * sizes[k - 1, c]",
+        (EXPONENTIAL,),
+    ),
+    Fault(
+        "a push in a step lies on the chord from its start to its end",
+        "enclosure/exponential.py",
+        "off += chord_distance(k) * sizes[k, i] / factorial",
+        "off += 0.0",
+        (EXPONENTIAL,),
+    ),
+    Fault(
+        "a push in a step counts at its end only",
+        "enclosure/exponential.py",
+        "tops[i, c] = (max(unit[i, 0], end) + off) * UP",
+        "tops[i, c] = (end + off) * UP",
+        (EXPONENTIAL,),
+    ),
+    Fault(
+        "pushes in a step leave nothing at its end",
+        "enclosure/step.py",
+        "grown[old + n + 2 * i : old + n + 2 * i + 2] = c_total[i] * chords[i]",
+        "grown[old + n + 2 * i : old + n + 2 * i + 2] = 0.0 * chords[i]",
+        (REMAINDER,),
+    ),
+    Fault(
+        "what pushes in a step bring follows the Jacobian at its start",
+        "enclosure/step.py",
+        "again[r] += h * moved * reached[k, 0]",
+        "again[r] += 0.0",
+        (REMAINDER,),
+    ),
+    Fault(
+        "the Jacobian moves under the disturbance a quarter as much",
+        "enclosure/step.py",
+        "moved = 0.5 * (RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k]))",
+        "moved = 0.0",
         (REMAINDER,),
     ),
     Fault(
@@ -203,7 +260,7 @@ KERNEL_FAULTS = (
     Fault(
         "transported generators lose their high degrees",
         "enclosure/variational.py",
-        "                        lost[r] += nF[r, c, d] * tail[c, q + 1 - d]\n",
+        "                        lost[r] += nF[r, c, d] * tail[q + 1 - d]\n",
         "                        lost[r] += 0.0\n",
         (OPERATIONS,),
     ),

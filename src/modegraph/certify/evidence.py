@@ -104,3 +104,12 @@ def sampled_violation(flow: Flow) -> bool:
     inputs, _ = flow.variables_at(flow.time, p, G, fld)
     faces = Evaluator(fld.observed)(inputs @ powers.T)[: len(fld.faces)]
     return bool((faces > 0.0).any())
+
+
+def set_size(flow: Flow) -> float:
+    """Half-width of the last set of a flow, in the state where it is largest relative to the starts (floats)."""
+    p, G = flow.state_set(len(flow.steps))
+    start, slack = flow.state_set(0)
+    own = np.abs(start[:, 1:]).sum(axis=1) + generator_box(slack)
+    now = np.abs(p[:, 1:]).sum(axis=1) + generator_box(G)
+    return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))

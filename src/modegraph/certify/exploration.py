@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cores import in_parallel
+from ..enclosure.monomials import monomial_count
 from ..expression.tape import Tape
 from ..reach.chain import nonlinear_variable
 from ..reach.decay import SettledLoop
 from ..reach.field import Field
-from ..reach.flow import RESTART_STEPS, Flow, Order
-from ..reach.framing import generator_box
+from ..reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
 from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
 from ..reach.restart import WIDE_GAP, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
-from .evidence import lasting, sampled_violation, slack_until, unproved
+from .evidence import lasting, sampled_violation, set_size, slack_until, unproved
 from .findings import Findings, better, merge, settle
 from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
 from .region import Region
@@ -42,6 +42,10 @@ SETTLING = 4.0
 TOO_MUCH_FEEDBACK = 0.5
 WORTH_A_TAIL = 0.7
 """An invariant set is looked for again when the reach set is smaller by this factor."""
+STALLED = 0.98
+"""A gauge that shrinks by less than this from one look to the next does so no more."""
+IDLE_LOOKS = 4
+"""Such looks in a row until an invariant set is looked for, where a flow may be enclosed again before."""
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
@@ -107,9 +111,9 @@ class Exploration:
         if self.linear or m == 0:
             return Order(1, 0)
         degree, jacobian = LADDER[effort]
-        while degree > 3 and _count(m, degree) > MOST_MONOMIALS:
+        while degree > 3 and monomial_count((1,) * m, degree) > MOST_MONOMIALS:
             degree -= 1
-        while jacobian > 1 and _count(m, jacobian) > MOST_GENERATOR_MONOMIALS:
+        while jacobian > 1 and monomial_count((1,) * m, jacobian) > MOST_GENERATOR_MONOMIALS:
             jacobian -= 1
         return Order(degree, min(jacobian, degree - 1))
 
@@ -262,6 +266,8 @@ class Exploration:
         pending = list(wanted)
         checkpoint = 8
         tried = np.inf
+        idle = 0
+        disturbed = not self.linear and bool(self.w_radius.any())
         taken = len(flow.steps)
         while flow.time < end and time.monotonic() < self.deadline:
             if not flow.advance(end):
@@ -284,7 +290,13 @@ class Exploration:
             self.tick(f"t = {flow.time:.3g} s")
             now = {j: self._gauge_now(flow, j) for j in pending}
             pending = [j for j in pending if not now[j] <= 1.0]
-            if tail is None and flow.time >= start and (size := set_size(flow)) < WORTH_A_TAIL * tried:
+            stalled = all(now[j] > STALLED * previous[j] for j in pending)
+            idle = idle + 1 if stalled else 0
+            # Enclosed again, a flow would go on without what was found.
+            patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 1
+            passing = park and pending and disturbed and idle < patience
+            size = set_size(flow)
+            if tail is None and flow.time >= start and not passing and size < WORTH_A_TAIL * tried:
                 tried = size
                 search = TailSearch(
                     flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
@@ -303,7 +315,7 @@ class Exploration:
             if not pending and (tail is not None or not safety):
                 break
             settled = tail is not None and np.isfinite(decay) and flow.time > tail.start + SETTLING / decay
-            if settled and all(now[j] > 0.98 * previous[j] for j in pending):
+            if settled and stalled:
                 sinking = self._sink(flow, pending)
                 if isinstance(sinking, Sinking) and any(self._arrives(sinking, j) for j in pending):
                     tail = sinking
@@ -464,19 +476,3 @@ class Exploration:
                 return SafetyProof({}, flow.time, np.full(last.outputs, np.inf))
             return None
         return lasting([*before, *flows], tail)
-
-
-def set_size(flow: Flow) -> float:
-    """Half-width of the last set of a flow, in the state where it is largest relative to the starts (floats)."""
-    p, G = flow.state_set(len(flow.steps))
-    start, slack = flow.state_set(0)
-    own = np.abs(start[:, 1:]).sum(axis=1) + generator_box(slack)
-    now = np.abs(p[:, 1:]).sum(axis=1) + generator_box(G)
-    return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))
-
-
-def _count(m: int, degree: int) -> int:
-    count = 1
-    for k in range(1, degree + 1):
-        count = count * (m + k) // k
-    return count

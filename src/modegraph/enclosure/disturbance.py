@@ -5,33 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .exponential import POWERS, exponential_terms
 from .polynomial import KERNEL
 from .rounding import TINY, UNIT, UP
-from .variational import apply_matrix, matrix_product
 
 SET_VARIABLE = -1
 DROPPED = -2
 """Owners of a monomial of the Jacobian's table: kept, or of a degree that G and Psi do not carry;
 any other owner v means that the monomial holds the error variable of state v."""
 
-MOST_POWERS, NEGLIGIBLE = 200, 1e-18
-"""Powers of the Jacobian taken one by one: until the tail, in the infinity norm, is so small."""
-
-SIGMA_2 = 0.1284
-"""int_0^1 |s^2/2 - 1/6| ds = 2 / (9 sqrt(3)) = 0.12830..., rounded up."""
+MEAN = (1.0, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, 1 / 5040)
+"""int_0^1 x^k / k! dx = 1 / (k + 1)!."""
+SLOPE = (0.0, 1.0, 1 / 2, 3 / 20, 1 / 30, 1 / 168, 1 / 1120)
+"""Slope 6 k / (k! (k + 1) (k + 2)) of the line nearest to x^k / k! over [0, 1]; it has the same mean."""
+ROUNDED = 64.0
+"""Roundings of a column's coefficient, at most."""
+STRAY = (0.0, 0.0, 0.0321, 0.0162, 0.0047, 0.00099, 0.00017)
+"""Mean distance of x^k / k! from that line, rounded up."""
 
 
 @njit(**KERNEL)
 def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
     """Mean over the step of each column of df/dw, its sup, and the radius of what the mean misses.
 
-    Output node ``outputs[first + i * nw + j]`` is df_i/dw_j. Returns B (nw, n, Nq), size (n,) =
-    sup |B| wr, miss (n,) = sup |df/dw - B| wr.
+    Output node ``outputs[first + i * nw + j]`` is df_i/dw_j. Returns B (nw, n, Nq) and miss (n,) =
+    sup |df/dw - B| wr.
     """
     nw = radius.size
     Nq = embed.size
     B = np.zeros((nw, n, Nq))
-    size = np.zeros(n)
     miss = np.zeros(n)
     for i in range(n):
         for j in range(nw):
@@ -49,65 +51,43 @@ def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
                     a += abs(x) / (l + 1)
                     B[j, i, k] += x / (l + 1)
             off += 1.01 * (KJ + 3) * UNIT * a
-            size[i] += a * UP * radius[j]
             miss[i] += off * UP * radius[j]
     for i in range(n):
-        size[i] = size[i] * UP + TINY
         miss[i] = miss[i] * UP + TINY
-    return B, size, miss
+    return B, miss
 
 
 @njit(**KERNEL)
-def disturbance_columns(J, dJ, B, size_b, radius, Y, size_y, h, q, pairs, product, offset, start, degree):
-    """u' = h J(0, xi) u + h B(xi) v, |v| <= radius, gives u(1) = int exp(Z (1 - s)) h B v ds, Z = h J(0, xi).
+def disturbance_columns(J, dJ, nJ, B, radius, h, q, pairs, product, offset, start, degree):
+    """u' = h J(0, xi) u + h B(xi) v, |v| <= radius, gives u(1) = int_0^1 exp(Z x) h B v dx, Z = h J(0, xi).
 
-    Two columns an input, first and second (nw, n, Nq), and a box (n,) for the rest. Y (n, n) bounds |Z|
-    entrywise, size_y its infinity norm, size_b = sup |B| radius.
+    Of x^k / k! in the exponential its mean acts on int v, its slope on int (x - 1/2) v, at most radius / 4,
+    and for k = 2 the rest on one more number: three columns an input (nw, 3, n, Nq). Then a box (n,) for what
+    is left, and a bound (n,) of |u(s)| / s. nJ (n*n, KJ+1, q+1): norms of J by degree, upward.
     """
     nw, n, Nq = B.shape
     outside = np.zeros(n)
-    first = np.zeros((nw, n, Nq))
-    second = np.zeros((nw, n, Nq))
-    if nw > 0:
-        Y2 = matrix_product(Y, Y) * UP
-        largest = 0.0
+    speed = np.zeros(n)
+    columns = np.zeros((nw, 3, n, Nq))
+    for j in range(nw):
+        images, sizes, missed, beyond = exponential_terms(
+            J, dJ, nJ, B[j], h, q, pairs, product, offset, start, degree
+        )  # fmt: skip
+        weight = h * radius[j]
         for i in range(n):
-            largest = max(largest, h * size_b[i])
-        # Third and higher powers entry by entry, int (1 - s)^k / k! ds = 1 / (k + 1)!; the tail beyond
-        # in the infinity norm, hence in every entry. That norm knows no units: where those of the states
-        # differ it is far larger than the entries, so powers are taken until nothing is left to it.
-        high = np.zeros(n)
-        power = h * size_b
-        tail = 1.0
-        k = 0
-        while k < MOST_POWERS and (k < 10 or tail > NEGLIGIBLE):
-            k += 1
-            following = np.full(n, TINY)
-            for i in range(n):
-                for l in range(n):
-                    following[i] += Y[i, l] * power[l]
-            power = following * (UP / (k + 1))
-            tail *= size_y / (k + 1) * UP
-            if k > 2:
-                high += power
-        high *= UP
-        rest = tail * size_y / (k + 2) * np.exp(size_y) * UP * largest
-        gamma = 1.01 * (2 * n * pairs + 3 * n + 16) * UNIT
-        for i in range(n):
-            s = rest + high[i]
-            for k in range(n):
-                identity = 1.0 if i == k else 0.0
-                s += (SIGMA_2 * Y2[i, k] + gamma * (identity + Y[i, k] + Y2[i, k])) * h * size_b[k]
-            outside[i] += s * UP + TINY
-        for j in range(nw):
-            image, lost_1 = apply_matrix(J, dJ, B[j], n, q, h, product, offset, start, degree)
-            again, lost_2 = apply_matrix(J, dJ, image, n, q, h, product, offset, start, degree)
-            for i in range(n):
-                s = 0.75 * lost_1[i] + lost_2[i] / 6.0
-                for k in range(n):
-                    s += Y[i, k] * lost_1[k] / 6.0
-                outside[i] += h * radius[j] * s * UP
+            s = beyond[i] / (POWERS + 2)
+            t = beyond[i]
+            factorial = 1.0
+            for k in range(POWERS + 1):
+                factorial *= max(k, 1)
+                stray = STRAY[k] if k > 2 else 0.0
+                s += MEAN[k] * missed[k, i] + (stray + ROUNDED * UNIT) * sizes[k, i]
+                t += (sizes[k, i] + missed[k, i]) / factorial
                 for l in range(Nq):
-                    first[j, i, l] = h * radius[j] * (B[j, i, l] + image[i, l] / 2.0 + again[i, l] / 6.0)
-                    second[j, i, l] = h * radius[j] * image[i, l] / 4.0
-    return first, second, outside
+                    columns[j, 0, i, l] += weight * MEAN[k] * images[k, i, l]
+                    columns[j, 1, i, l] += weight * (SLOPE[k] / 4.0) * images[k, i, l]
+            for l in range(Nq):
+                columns[j, 2, i, l] = weight * STRAY[2] * images[2, i, l]
+            outside[i] += weight * s * UP + TINY
+            speed[i] += weight * t * UP + TINY
+    return columns, outside * UP, speed * UP

@@ -12,6 +12,7 @@ from numba import njit
 
 from .adjoint import tighten
 from .disturbance import DROPPED, disturbance_bounds, disturbance_columns
+from .exponential import push_columns
 from .jets import solve_in_time
 from .polynomial import KERNEL
 from .quadratic import MAIN_GENERATORS, main_generators, quadratic_bound
@@ -220,11 +221,15 @@ def flow_step(
     u = nothing
     X = A0
     W = A0
-    Y = np.zeros((n, n))
-    size_y = 0.0
     F = np.zeros((n, n, Nq))
-    B = np.zeros((nw, n, Nq))
-    size_b = np.zeros(n)
+    columns = np.zeros((nw, 3, n, Nq))
+    chords = np.zeros((0, 2, n, Nq))
+    strays = np.zeros((n, n))
+    tops = strays
+    outside = nothing
+    miss_b = nothing
+    c_total = nothing
+    rest = nothing
     accepted = False
     for _attempt in range(8):
         truncate_inputs(P, dg, norms, variables, Q, dq, jvariables, KJ, q, embed, start, lost)
@@ -260,20 +265,12 @@ def flow_step(
         W, _ = exponential_majorant(X)
         control[3] = spectral_radius(X)
         F, sup, last, curve, tails = fundamental_matrix(J, dJ, n, h, KJ, KP, q, product, offset, start, degree)
-        B, size_b, miss_b = disturbance_bounds(Q, RQ, joutputs, n * n, n, radius, KJ, embed, owner)
-        u = np.zeros(n)
+        B, miss_b = disturbance_bounds(Q, RQ, joutputs, n * n, n, radius, KJ, embed, owner)
+        columns, outside, u = disturbance_columns(
+            J, dJ, nJ, B, radius, h, q, pairs, product, offset, start, degree
+        )  # fmt: skip
         if nw > 0:
-            for r in range(n):
-                for c in range(n):
-                    s = 0.0
-                    for d in range(q + 1):
-                        s += nJ[r * n + c, 0, d]
-                    Y[r, c] = s * h * UP
-            W_set, size_y = exponential_majorant(Y)
-            for r in range(n):
-                for c in range(n):
-                    u[r] += W_set[r, c] * h * size_b[c]
-            u = u * UP
+            chords, strays, tops = push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree)
         H_end, dropped = advance_generators(F, G, q, pairs, product, offset, start, degree)
         for i in range(n):
             for k in range(n):
@@ -328,11 +325,12 @@ def flow_step(
             for r in range(n):
                 s = defect[r] + h * miss_b[r] + h * push[r]
                 for k in range(n):
-                    # u follows J at s = 0; what moves later, or with e, acts on it from outside.
-                    moved = RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k])
+                    # u follows J at s = 0; what moves later, or with e, acts on it from outside. |u(s)| <= s u:
+                    # s and s^(i + 1) have the means 1/2 and 1/(i + 2).
+                    moved = 0.5 * (RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k]))
                     for i in range(1, KJ + 1):
                         for d in range(q + 1):
-                            moved += nJ[r * n + k, i, d]
+                            moved += nJ[r * n + k, i, d] / (i + 2)
                     s += E[r, k] * z[k] + h * moved * u[k]
                 c_total[r] = s * UP
             control[4] = 0.0
@@ -342,23 +340,35 @@ def flow_step(
                 for k in range(n):
                     s += E[r, k] * z[k]
                 control[4] = max(control[4], s / (s + defect[r] + u[r] + TINY))
-            Wc = np.zeros(n)
-            for r in range(n):
-                for k in range(n):
-                    Wc[r] += W[r, k] * c_total[k]
-            Wc = Wc * UP
+            # With a disturbance c is large. What it brings then follows J at s = 0 as u does, and what that
+            # misses is pushed again.
+            reached = np.zeros((n, 1))
+            again = c_total
+            if nw > 0:
+                reached = matrix_product(tops, c_total.reshape(n, 1)) * UP
+                again = np.zeros(n)
+                for r in range(n):
+                    for k in range(n):
+                        moved = RJ[r * n + k] + 4.0 * UNIT * abs(A0[r, k])
+                        for i in range(1, KJ + 1):
+                            for d in range(q + 1):
+                                moved += nJ[r * n + k, i, d] / (i + 1)
+                        again[r] += h * moved * reached[k, 0]
+                again = again * UP + TINY
+            W_again = matrix_product(W, again.reshape(n, 1))[:, 0] * UP
             WD = matrix_product(W, D) * UP
             control[2] = spectral_radius(h * WD)
-            ok_plain, g_plain = growth_bound(h, M, c_total)
-            ok_exp, g_exp = growth_bound(h, WD, Wc)
+            ok_plain, g_plain = growth_bound(h, M, again)
+            ok_exp, g_exp = growth_bound(h, WD, W_again)
             if ok_plain and ok_exp:
-                g = np.minimum(g_plain, g_exp)
+                rest = np.minimum(g_plain, g_exp)
             elif ok_plain:
-                g = g_plain
+                rest = g_plain
             elif ok_exp:
-                g = g_exp
+                rest = g_exp
             else:
                 return NO_GROWTH_BOUND, 0, nothing_p, G, ebox, nothing, defect, control
+            g = (reached[:, 0] + rest) * UP
             need = np.zeros(n)
             inside = True
             for r in range(n):
@@ -387,7 +397,7 @@ def flow_step(
     # p(1): K + 1 terms summed, at most K roundings.
     p_end = np.zeros((n, N))
     bend = np.zeros(n)
-    box = g.copy()
+    box = rest + matrix_product(strays, c_total.reshape(n, 1))[:, 0] * UP
     for i in range(n):
         v = variables[i]
         e = 0.0
@@ -404,21 +414,22 @@ def flow_step(
             for d in range(norms.shape[2]):
                 s += chord_distance(j) * norms[v, j, d]
         bend[i] = s * UP
-    first, second, outside = disturbance_columns(
-        J, dJ, B, size_b, radius, Y, size_y, h, q, pairs, product, offset, start, degree
-    )
     for i in range(n):
         box[i] = (box[i] + outside[i]) * UP
     old = H_end.shape[0]
-    grown = np.zeros((old + n + 2 * nw, n, Nq))
+    carried = chords.shape[0]
+    fresh = 2 * carried + 3 * nw
+    grown = np.zeros((old + n + fresh, n, Nq))
     grown[:old] = H_end
     for i in range(n):
         grown[old + i, i, 0] = (box[i] + dropped[i]) * UP + TINY
+    for i in range(carried):
+        grown[old + n + 2 * i : old + n + 2 * i + 2] = c_total[i] * chords[i]
     for j in range(nw):
-        grown[old + n + 2 * j] = first[j]
-        grown[old + n + 2 * j + 1] = second[j]
+        row = old + n + 2 * carried + 3 * j
+        grown[row : row + 3] = columns[j]
     if grown.shape[0] > most:
-        grown = reduce_generators(grown, most - 2 * n - 2 * nw)
+        grown = reduce_generators(grown, most - 2 * n - fresh)
     time_error = 0.0
     other = 0.0
     for i in range(n):

@@ -271,6 +271,10 @@ def apply_matrix(J, dJ, vector, n, q, factor, product, offset, start, degree):
     return out, lost * UP
 
 
+BLOCK = 64
+"""Generators transported side by side: one look at the table of products serves all of them."""
+
+
 @njit(**KERNEL)
 def advance_generators(F, G, q, pairs, product, offset, start, degree):
     """F(xi) G(xi) truncated at degree q, and a box radius for what is dropped or rounded."""
@@ -279,36 +283,59 @@ def advance_generators(F, G, q, pairs, product, offset, start, degree):
     lost = np.zeros(n)
     nF = np.zeros((n, n, q + 1))
     sF = np.zeros((n, n))
-    dF = np.full((n, n), -1, np.int64)
     gamma = 1.01 * (n * pairs + 4) * UNIT
     for r in range(n):
         for c in range(n):
             for d in range(q + 1):
                 for k in range(start[d], start[d + 1]):
                     nF[r, c, d] += abs(F[r, c, k])
-                if nF[r, c, d] > 0.0:
-                    dF[r, c] = d
                 sF[r, c] += nF[r, c, d]
-    tail = np.zeros((n, q + 2))
-    dG = np.zeros(n, np.int64)
-    for g in range(count):
+    tail = np.zeros(q + 2)
+    before = np.zeros((n, Nq, BLOCK))
+    after = np.zeros((n, Nq, BLOCK))
+    for first in range(0, count, BLOCK):
+        most = min(BLOCK, count - first)
+        top = np.full(n, -1, np.int64)
         for c in range(n):
-            dG[c] = -1
-            for d in range(q, -1, -1):
-                s = 0.0
-                for k in range(start[d], start[d + 1]):
-                    s += abs(G[g, c, k])
-                tail[c, d] = tail[c, d + 1] + s
-                if s > 0.0 and dG[c] < 0:
-                    dG[c] = d
+            for g in range(most):
+                tail[:] = 0.0
+                for d in range(q, -1, -1):
+                    s = 0.0
+                    for k in range(start[d], start[d + 1]):
+                        s += abs(G[first + g, c, k])
+                    tail[d] = tail[d + 1] + s
+                    if s > 0.0:
+                        top[c] = max(top[c], d)
+                for r in range(n):
+                    for d in range(1, q + 1):
+                        lost[r] += nF[r, c, d] * tail[q + 1 - d]
+                    lost[r] += gamma * sF[r, c] * tail[0]
+            for k in range(Nq):
+                for g in range(most):
+                    before[c, k, g] = G[first + g, c, k]
+        after[:] = 0.0
         for r in range(n):
             for c in range(n):
-                if dG[c] >= 0 and dF[r, c] >= 0:
-                    multiply_into(H[g, r], F[r, c], dF[r, c], G[g, c], dG[c], q, 1.0, product, offset, start, degree)
-                    for d in range(1, dF[r, c] + 1):
-                        lost[r] += nF[r, c, d] * tail[c, q + 1 - d]
-                    lost[r] += gamma * sF[r, c] * tail[c, 0]
+                if top[c] >= 0:
+                    _multiply_block(after[r], F[r, c], before[c], top[c], q, product, offset, start, degree)
+        for g in range(most):
+            for r in range(n):
+                for k in range(Nq):
+                    H[first + g, r, k] = after[r, k, g]
     return H, lost * UP
+
+
+@njit(**KERNEL)
+def _multiply_block(out, a, columns, top, q, product, offset, start, degree):
+    """out += a columns, truncated at degree q: polynomials (Nq, BLOCK) side by side, of degree ``top``."""
+    for i in range(start[q + 1]):
+        x = a[i]
+        if x != 0.0:
+            o = offset[i]
+            for j in range(start[min(top, q - degree[i]) + 1]):
+                k = product[o + j]
+                for g in range(BLOCK):
+                    out[k, g] += x * columns[j, g]
 
 
 @njit(**KERNEL)

@@ -15,7 +15,7 @@ from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
-from modegraph.cores import COUNT, one_core
+from modegraph.cores import COUNT, one_core, single_threaded_algebra
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.classes import Classes, Link
 from modegraph.graph.modegraph import ModeGraph, Node
@@ -226,7 +226,8 @@ class _Work:
         self.waiting = len(self.units)
         self.threads = threads
         self.report(0, len(self.units), "")
-        with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="modegraph") as pool:
+        pools = ThreadPoolExecutor(max_workers=threads, thread_name_prefix="modegraph")
+        with single_threaded_algebra(), pools as pool:
             futures = {pool.submit(self._unit, unit): unit for unit in self.units}
             try:
                 self._watch(futures)

@@ -1,0 +1,114 @@
+"""What acts on the error from outside during a step, carried to its end by exp(Z x), Z = h J(0, xi) (numba)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .polynomial import KERNEL
+from .rounding import TINY, UNIT, UP
+from .variational import apply_matrix, chord_distance, matrix_product
+
+POWERS = 6
+"""Powers of Z that are formed, so that their terms cancel as they do in truth."""
+
+
+@njit(**KERNEL)
+def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, degree):
+    """Z^k v for k = 0 .. POWERS: polynomials (POWERS+1, n, Nq), their norms and what they miss (POWERS+1, n), and
+    a bound (n,) of |Z^k v| / k! summed over all higher k.
+
+    v (n, Nq). nJ (n*n, KJ+1, q+1): norms of J by degree, upward.
+    """
+    n, Nq = vector.shape
+    images = np.zeros((POWERS + 1, n, Nq))
+    sizes = np.zeros((POWERS + 1, n))
+    missed = np.zeros((POWERS + 1, n))
+    gamma = 1.01 * (n * pairs + 2 * n + 16) * UNIT
+    # |Z| entrywise, and its infinity norm.
+    Y = np.zeros((n, n))
+    norm = 0.0
+    for r in range(n):
+        row = 0.0
+        for c in range(n):
+            s = 0.0
+            for d in range(q + 1):
+                s += nJ[r * n + c, 0, d]
+            Y[r, c] = s * h * UP
+            row += Y[r, c]
+        norm = max(norm, row * UP)
+    images[0] = vector
+    for k in range(POWERS + 1):
+        if k > 0:
+            images[k], lost = apply_matrix(J, dJ, images[k - 1], n, q, h, product, offset, start, degree)
+            for i in range(n):
+                s = lost[i] + TINY
+                for c in range(n):
+                    s += Y[i, c] * (missed[k - 1, c] + gamma * sizes[k - 1, c])
+                missed[k, i] = s * UP
+        for i in range(n):
+            s = 0.0
+            for l in range(Nq):
+                s += abs(images[k, i, l])
+            sizes[k, i] = s * UP
+    # Higher powers entry by entry, then in the infinity norm, hence in every entry.
+    power = (sizes[POWERS] + missed[POWERS]).reshape(n, 1)
+    beyond = np.zeros(n)
+    factorial = 1.0
+    for k in range(1, POWERS + 1):
+        factorial *= k
+    for k in range(POWERS + 1, POWERS + 7):
+        factorial *= k
+        power = matrix_product(Y, power) * UP
+        for i in range(n):
+            beyond[i] += power[i, 0] / factorial
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, power[i, 0])
+    tail = largest * norm / (factorial * (POWERS + 7)) * np.exp(norm) * UP
+    for i in range(n):
+        beyond[i] = (beyond[i] + tail) * UP + TINY
+    return images, sizes, missed, beyond
+
+
+@njit(**KERNEL)
+def push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree):
+    """y' = h J(0, xi) y + c' with |c'_i| of integral at most 1, in one i at a time.
+
+    A push at x before the end ends as exp(Z x) e_i, which is near the chord from e_i to exp(Z) e_i. Returns
+    columns for the middle and half of each chord (n, 2, n, Nq), row i for a push in i; boxes (n, n) for what is
+    not on it, column i for a push in i; and bounds (n, n) of |y| during the step.
+    """
+    Nq = J.shape[2]
+    chords = np.zeros((n, 2, n, Nq))
+    strays = np.zeros((n, n))
+    tops = np.zeros((n, n))
+    unit = np.zeros((n, Nq))
+    for c in range(n):
+        unit[:] = 0.0
+        unit[c, 0] = 1.0
+        images, sizes, missed, beyond = exponential_terms(J, dJ, nJ, unit, h, q, pairs, product, offset, start, degree)
+        for i in range(n):
+            off = beyond[i]
+            whole = 0.0
+            factorial = 1.0
+            for k in range(1, POWERS + 1):
+                factorial *= k
+                whole += sizes[k, i] / factorial
+                off += missed[k, i] / factorial
+                if k > 1:
+                    off += chord_distance(k) * sizes[k, i] / factorial
+            end = 0.0
+            for l in range(Nq):
+                s = 0.0
+                factorial = 1.0
+                for k in range(1, POWERS + 1):
+                    factorial *= k
+                    s += images[k, i, l] / factorial
+                chords[c, 0, i, l] = unit[i, l] + 0.5 * s
+                chords[c, 1, i, l] = 0.5 * s
+                end += abs(unit[i, l] + s)
+            off += 32.0 * UNIT * (whole + 1.0)
+            strays[i, c] = off * UP
+            tops[i, c] = (max(unit[i, 0], end) + off) * UP
+    return chords, strays, tops
