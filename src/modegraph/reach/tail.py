@@ -203,7 +203,11 @@ class TailSearch:
         d = int((chart.unknown_lo < chart.unknown_hi).sum())
         piece = Piece(chart, -np.ones(k + d), np.ones(k + d))
         last = replace(self.fld, start=0.0)
-        flow = Flow([last], piece, self.w_centre, self.w_radius, self.order, names=self.names, framed=True)
+        order = self.order
+        if order.weights:
+            # Those of the columns of B are not those of the states; the unknowns are the same.
+            order = replace(order, weights=(1,) * k + order.weights[len(order.weights) - d :])
+        flow = Flow([last], piece, self.w_centre, self.w_radius, order, names=self.names, framed=True)
         span = 25.0 / decay
         while flow.time < span and len(flow.steps) < 400:
             if not flow.advance(span):
