@@ -22,7 +22,7 @@ KERNEL_FAULTS = (
     Fault(
         "a relation looks at the middle of the starts only",
         "enclosure/pairs.py",
-        "+ spread[k, 0]) * (1.0 + ROUNDED)",
+        "+ spread[k, 0] / room) * (1.0 + ROUNDED)",
         ") * (1.0 + ROUNDED)",
         ("tests/enclosure/test_pairs.py",),
     ),

@@ -340,7 +340,7 @@ class ContinuousReferences:
             cells = self._certified_cells(key, MANY_CELLS if sharp else MOST_CELLS)
             left = np.prod(cells.hi - cells.lo, axis=1)
             certified, possible = cells.certified, cells.certified + float(left.sum())
-            if not sharp and len(left):
+            if not sharp and left.sum() > 0.0:
                 rng = np.random.default_rng(0)
                 chosen = rng.choice(len(left), SAMPLES, p=left / left.sum())
                 source, target = self._split(rng.uniform(cells.lo[chosen], cells.hi[chosen]))

@@ -287,8 +287,10 @@ def _gauges(goal: TargetClass, low: Floats, high: Floats, spread: Floats, limits
     """(B,): the largest gauge over ranges (B, K, f) at the best instant."""
     with np.errstate(divide="ignore", invalid="ignore"):
         if goal.round:
-            reach = np.sqrt((np.maximum(np.abs(low), np.abs(high)) ** 2).sum(axis=2)) * goal.grow * (1.0 + ROUNDED)
-            found = (reach + spread[:, 0]) * (1.0 + ROUNDED) / limits
+            # In units of the limit: the square of a tiny length would be 0.
+            part = np.maximum(np.abs(low), np.abs(high)) / limits[:, :, None]
+            reach = np.sqrt((part**2).sum(axis=2)) * goal.grow * (1.0 + ROUNDED)
+            found = (reach + spread[:, 0] / limits) * (1.0 + ROUNDED)
         else:
             reach = high + spread
             reach = reach + ROUNDED * np.abs(reach)

@@ -23,10 +23,13 @@ from ..model.mode import Mode
 from ..model.sets import Ball, Box, Ellipsoid, Set, Zonotope
 from ..model.start import mode_start
 from ..model.target import Target
+from ..reach.class_chart import class_chart, require_same_start
 from .region import Region
 
 Floats = NDArray[np.float64]
 
+PLAIN_LOOKS = 10
+"""References at which a start function is compared with its formula."""
 ROUNDED = 1e-12
 """Relative allowance: a start set written with floats may differ so much from its exact formula."""
 
@@ -177,6 +180,7 @@ def target_class(mode: Mode | Target, p: Floats | None, plant: int) -> TargetCla
         return _fixed(start, mode.name, plant, mode.reference.region)
     if start.dim != plant:
         raise ModegraphError(f"mode {mode.name!r}: a target over a memory cannot depend on a continuous class yet")
+    _require_plain(mode, start)
     n, traced = start.dim, start.set
     eye = np.eye(n)
     nothing = np.zeros((n, n))
@@ -194,6 +198,19 @@ def target_class(mode: Mode | Target, p: Floats | None, plant: int) -> TargetCla
     raise ModegraphError(
         f"mode {mode.name!r}: a Zonotope whose generators depend on the reference cannot be a target; use a Box"
     )
+
+
+def _require_plain(mode: Mode, start: StartClass) -> None:
+    """The start function gives in floats what its formula says, at some references of the class.
+
+    A formula that cancels does not: a run would enter another set than was proved.
+    """
+    region = start.region
+    rng = np.random.default_rng(11)
+    nothing = np.zeros(0)
+    chart = class_chart(start, nothing, nothing)
+    for p in [region.lo, region.hi, *rng.uniform(region.lo, region.hi, (PLAIN_LOOKS, region.dim))]:
+        require_same_start(start, chart, mode_start(mode, p), p, mode.label)
 
 
 def _fixed(target: Set, name: str, plant: int | None = None, region: Box | None = None) -> TargetClass:

@@ -11,6 +11,8 @@ from .variational import apply_matrix, chord_distance, matrix_product
 
 POWERS = 6
 """Powers of Z that are formed, so that their terms cancel as they do in truth."""
+MOST_POWERS, NEGLIGIBLE = 200, 1e-18
+"""Powers bounded entry by entry: until the next would add so little of the first of them."""
 
 
 @njit(**KERNEL)
@@ -51,23 +53,24 @@ def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, de
             for l in range(Nq):
                 s += abs(images[k, i, l])
             sizes[k, i] = s * UP
-    # Higher powers entry by entry, then in the infinity norm, hence in every entry.
+    # Higher powers entry by entry, the rest in the infinity norm, hence in every entry. That norm knows no units:
+    # where those of the states differ it is far larger than the entries, so powers go on until nothing is left to it.
     power = (sizes[POWERS] + missed[POWERS]).reshape(n, 1)
-    beyond = np.zeros(n)
-    factorial = 1.0
     for k in range(1, POWERS + 1):
-        factorial *= k
-    for k in range(POWERS + 1, POWERS + 7):
-        factorial *= k
-        power = matrix_product(Y, power) * UP
-        for i in range(n):
-            beyond[i] += power[i, 0] / factorial
-    largest = 0.0
+        power = power * (UP / k)
+    largest = power.max()
+    negligible = NEGLIGIBLE * largest
+    beyond = np.zeros(n)
+    k = POWERS
+    while k < MOST_POWERS and (k < POWERS + 6 or 2.0 * norm > k + 2.0 or largest > negligible):
+        k += 1
+        power = matrix_product(Y, power) * (UP / k)
+        beyond += power[:, 0] * UP
+        largest = power.max()
+    # sum over m >= 1 of norm^m / ((k + 1) ... (k + m)).
+    rest = norm / (k + 1.0) * (2.0 if 2.0 * norm <= k + 2.0 else np.exp(norm)) * UP
     for i in range(n):
-        largest = max(largest, power[i, 0])
-    tail = largest * norm / (factorial * (POWERS + 7)) * np.exp(norm) * UP
-    for i in range(n):
-        beyond[i] = (beyond[i] + tail) * UP + TINY
+        beyond[i] = (beyond[i] + rest * largest) * UP + TINY
     return images, sizes, missed, beyond
 
 

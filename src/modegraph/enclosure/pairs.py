@@ -40,14 +40,16 @@ def _gauge(k, b, first, coefficients, terms, powers, shift, size, spread, fixed,
     count = shift.size
     total = 0.0
     worst = -np.inf
-    cap = enough * limits[b, 0] - spread[k, 0]
+    room = limits[b, 0]
+    cap = enough - spread[k, 0] / room
     for f in range(count):
         y = -shift[f]
         for m in range(terms):
             y += coefficients[first + f * terms + m] * powers[m]
         error = fixed[f] + ROUNDED * size[k, f]
         if is_round:
-            total += (abs(y) + error) ** 2
+            # In units of the limit: the square of a tiny length would be 0.
+            total += ((abs(y) + error) / room) ** 2
             if total > cap * cap or cap < 0.0:
                 return np.inf
             continue
@@ -61,7 +63,7 @@ def _gauge(k, b, first, coefficients, terms, powers, shift, size, spread, fixed,
             return np.inf
         worst = max(worst, gauge)
     if is_round:
-        worst = (np.sqrt(total) * grow * (1.0 + ROUNDED) + spread[k, 0]) * (1.0 + ROUNDED) / limits[b, 0]
+        worst = (np.sqrt(total) * grow * (1.0 + ROUNDED) + spread[k, 0] / room) * (1.0 + ROUNDED)
     return worst if worst <= enough else np.inf
 
 

@@ -116,7 +116,7 @@ class Reference(ABC):
             return self.parameters()[self.match(p)]
         size = self.region.dim
         within = f"{text_of(self.region.lo)} to {text_of(self.region.hi)}"
-        if p is None or (isinstance(p, Sequence | np.ndarray) and len(p) == 0):
+        if p is None or (isinstance(p, Sequence | np.ndarray) and np.size(p) == 0):
             raise ModegraphError(f"the references are a continuous class, {within}; name one of them")
         try:
             wanted = np.atleast_1d(np.asarray(p, dtype=float))
@@ -140,7 +140,7 @@ class Reference(ABC):
             If there is no such reference; the message lists those that exist.
         """
         known = self.parameters()
-        if p is None or (isinstance(p, Sequence | np.ndarray) and len(p) == 0):
+        if p is None or (isinstance(p, Sequence | np.ndarray) and np.size(p) == 0):
             if len(known) == 1:
                 return 0
             raise ModegraphError(f"there are {len(known)} references; name one of them: {_listing(known)}")

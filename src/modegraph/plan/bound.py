@@ -193,11 +193,9 @@ class Relaxation:
         if a.node[0] not in self.graph.regions:
             return np.zeros((1, 1))
         if not self._walks(a.node):
-            return (
-                np.where(np.eye(len(a.lo), dtype=bool), 0.0, np.inf)
-                if a is b
-                else np.full((len(a.lo), len(b.lo)), np.inf)
-            )
+            # The cells of a class only touch each other; a given end may be the same as another.
+            same = np.eye(len(a.lo), dtype=bool) if a is b else _apart(a, b) == 0.0
+            return np.where(same, 0.0, np.inf)
         apart = _apart(a, b)
         if wanted.travelled:
             return apart

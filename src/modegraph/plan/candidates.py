@@ -35,9 +35,9 @@ STRIDES = np.concatenate([[1.0], 0.98 * 2.0 ** -np.arange(0.0, 10.0, 0.5)])
 """Parts of what is left of a walk that are tried as one step, longest first."""
 FINER = (1.0, 1.5, 2.0, 3.0)
 """A walk is also tried in so many times the fewest steps, of equal length: short steps are quick."""
-MOST_WALKS = 12
-"""Walks that are followed for one question."""
-SHORT_WALK = 4.0
+MOST_WALKS, FEW_WALKS = 12, 3
+"""Walks that are followed for one question: where there is no way without, and where there is."""
+SHORT_WALK = 6.0
 """Gauges of a start set: a walk that may be worth it where there is a way without."""
 
 
@@ -68,7 +68,7 @@ class Proposals:
                 for k in open_:
                     walks[links[k]] = self._length(network, *links[k])
         # Where some route does without, only a short walk may be worth it.
-        for a, b in sorted(walks, key=walks.__getitem__)[: 1 if straight else MOST_WALKS]:
+        for a, b in sorted(walks, key=walks.__getitem__)[: FEW_WALKS if straight else MOST_WALKS]:
             if not straight or walks[a, b] <= SHORT_WALK:
                 self._walk(network, a, b)
 
@@ -150,6 +150,8 @@ class Proposals:
 
 def _nodes(network: Network, route: Route, start: End, goal: End) -> list[Node]:
     """The nodes of a route, with what is known of its ends."""
+    if len(route.stops) == 1:
+        return _common(network, start, goal)
     last = len(route.stops) - 1
     fixed: dict[int, Floats] = {}
     bounds: dict[int, tuple[Floats, Floats]] = {}
@@ -163,6 +165,19 @@ def _nodes(network: Network, route: Route, start: End, goal: End) -> list[Node]:
     return [
         network.propose(stop[0], p) if stop[0] in regions else stop for stop, p in zip(route.stops, found, strict=True)
     ]
+
+
+def _common(network: Network, start: End, goal: End) -> list[Node]:
+    """Where a plan may begin and end at once."""
+    name = start.stop[0]
+    if name not in network.graph.regions:
+        return [start.stop]
+    boxes = [end.within for end in (start, goal) if end.within is not None]
+    region = network.graph.regions[name]
+    lo, hi = np.max([region.lo, *(b.lo for b in boxes)], axis=0), np.min([region.hi, *(b.hi for b in boxes)], axis=0)
+    given = [end.p for end in (start, goal) if end.p is not None]
+    found = given or ([0.5 * (lo + hi)] if (lo <= hi).all() else [])
+    return [network.propose(name, p) for p in found if start.allows(p) and goal.allows(p)]
 
 
 def lattice(region: Box) -> Floats:

@@ -45,7 +45,7 @@ OUTGROWN = 1e3
 """A remainder this many times larger than the set is given up."""
 RUNAWAY_STEPS = 10
 """A remainder that doubles over this many steps while they cover little time is given up."""
-DISTURBED_RATE_CAP = 0.4
+DISTURBED_RATE_CAP = 0.2
 """The same with a disturbance: the boxes of what strays within a step grow with h A0, faster than the steps save."""
 RESTART_STEPS, RESTART_FEEDBACK, RESTART_SHARE = 12, 0.05, 0.3
 """A disturbed flow is enclosed and started again after this many steps, when the remainder feeds

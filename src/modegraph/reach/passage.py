@@ -90,9 +90,9 @@ class Passages:
 
 
 @lru_cache(maxsize=8)
-def _samples(variables: int, degree: int) -> tuple[Floats, Floats]:
+def _samples(weights: tuple[int, ...], degree: int) -> tuple[Floats, Floats]:
     """Monomials (S, N) at samples of the set variables, and (F, S): values there to the first F coefficients."""
-    table = monomials((1,) * variables, degree)
+    variables, table = len(weights), monomials(weights, degree)
     fit = int(next(k for k in table.start[:0:-1] if k <= max(FIT_MONOMIALS, variables + 1)))
     rng = np.random.default_rng(5)
     inner = np.cos(np.pi * rng.uniform(size=(int(SAMPLES * fit) + 8, variables)))
@@ -110,7 +110,7 @@ class _Walk:
 
     def __init__(self, flow: Flow, kinks: Kinks, own: Field, h: float) -> None:
         self.flow, self.kinks, self.h = flow, kinks, h
-        self.powers, self.solve = _samples(flow.piece.variables, flow.order.degree)
+        self.powers, self.solve = _samples(flow.order.weights or (1,) * flow.piece.variables, flow.order.degree)
         walk = copy(flow)
         walk.fields, walk.segment, walk.first_segment, walk.time = [own], 0, 0, 0.0
         walk.stops, walk.longest_step, walk.steps = [], np.inf, []
