@@ -77,6 +77,7 @@ def relate(
     rest = _resting(mode, p, compiled) if all(chain.flows[0].steps for chain in chains) else None
     goals = [_goal(spec, compiled.plant) for spec in targets]
     links = Links(compiled, region, [goal for goal in goals if isinstance(goal, TargetClass)], rest, end, chains)
+    links.appear(deadline, progress)
     if thorough:
         links.refine(deadline, progress)
     known = iter(links.relations)

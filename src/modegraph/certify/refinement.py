@@ -28,6 +28,8 @@ WORTH = 0.01
 SMALL = 0.01
 """Share of all pairs that may stay undecided."""
 MOST_PARTS, DEEPEST = 64, 9
+NEAR, NEARER = 1.5, 0.98
+"""A target missed by less is worth cuts, as long as each comes nearer by this."""
 
 
 @dataclass
@@ -78,13 +80,8 @@ class Links:
             if failing[worst] < WORTH * open_:
                 return
             progress(f"{len(self.chains)} parts, {100.0 * open_ / (SAMPLES * len(pairs)):.0f} % of pairs undecided")
-            halves = worst.piece.split(nonlinear_variable(worst.flows[0]))
-            children = [Chain(self.compiled, worst.framed, half, worst.order, until) for half in halves]
-            for child in children:
-                child.run(self.end)
-                self._parts[child] = self._proofs(child)
             before = self.chains
-            self.chains = [chain for chain in before if chain is not worst] + children
+            self._cut(worst, until)
             now, failing_now = self._failing(pairs)
             if now > (1.0 - WORTH) * open_:
                 # Two variables may need a cut each, but then this one was not the first to cut.
@@ -92,6 +89,44 @@ class Links:
                 hopeless.add(worst)
                 continue
             open_, failing = now, failing_now
+
+    def appear(self, until: float, progress: Callable[[str], None]) -> None:
+        """Cut the starts where a target that no pair of references is certified for is nearly met."""
+        for j, relation in enumerate(self.relations):
+            source, target = self._pairs(relation, j)
+            gauge = relation.crossings(source, target).gauge
+            while 1.0 < gauge.min() <= NEAR and len(self.chains) < MOST_PARTS and time.monotonic() < until:
+                k = int(np.argmin(gauge))
+                at = source[k : k + 1], target[k : k + 1]
+                worst = max(self.chains, key=lambda chain: self._gauge(chain, j, *at))
+                if worst.shared or worst.piece.depth >= DEEPEST:
+                    break
+                progress(f"{len(self.chains)} parts, a target is missed by {gauge[k] - 1.0:.2g} of its size")
+                before = self.chains
+                self._cut(worst, until)
+                closer = self.relations[j].crossings(source, target).gauge
+                if not closer.min() <= NEARER * gauge.min():
+                    self.chains = before
+                    break
+                gauge = closer
+
+    def _gauge(self, chain: Chain, j: int, source: Floats, target: Floats) -> float:
+        """How near one chain comes to a target for one pair; 0 where it has no starts."""
+        part, goal = self._parts[chain][j], self.goals[j]
+        if part is None:
+            return np.inf
+        if not part.meets(source, source)[0]:
+            return 0.0
+        return float(Relation(self.region, goal, (part,), None).crossings(source, target).gauge[0])
+
+    def _cut(self, chain: Chain, until: float) -> None:
+        """Halves of one chain's starts in its place."""
+        halves = chain.piece.split(nonlinear_variable(chain.flows[0]))
+        children = [Chain(self.compiled, chain.framed, half, chain.order, until) for half in halves]
+        for child in children:
+            child.run(self.end)
+            self._parts[child] = self._proofs(child)
+        self.chains = [other for other in self.chains if other is not chain] + children
 
     def _fails(self, part: Part | None, goal: TargetClass, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """Pairs for which a part has starts and proves nothing."""
