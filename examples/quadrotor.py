@@ -68,7 +68,7 @@ def in_flight(x, u):
 def near_ground(x, u):
     return {
         "pitch": abs(x[2]) <= 0.7,
-        "speed": abs(x[3:5]) <= [1.5, 0.6],
+        "speed": abs(x[3:5]) <= [2.0, 0.8],
         "thrust": abs(u - 3.0) <= 2.95,
     }
 

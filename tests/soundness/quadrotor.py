@@ -86,7 +86,7 @@ def rate(x: Vector, u: Vector, w: Vector) -> Vector:
 
 def excess(mode: str, x: Vector, u: Vector) -> float:
     """By how much the worst limit is broken; at most 0 where all hold."""
-    speeds = (1.5, 0.6) if mode == "touchdown" else (3.5, 3.5)
+    speeds = (2.0, 0.8) if mode == "touchdown" else (3.5, 3.5)
     found = [abs(x[2]) - 0.7, abs(x[3]) - speeds[0], abs(x[4]) - speeds[1], *(abs(u - 3.0) - 2.95)]
     return float(max(found if mode == "touchdown" else [*found, -x[1]]))
 

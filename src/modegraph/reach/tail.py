@@ -127,7 +127,7 @@ class TailSearch:
             if self.w_radius.any():
                 size = np.maximum(size, self._disturbed_size(np.asarray(np.linalg.inv(frame), float), slope, centre))
             # The ends of a class may be known in parts, more tightly than B as a whole will be.
-            for growth in (1.0, 1.6, 4.0) if self._tilt.any() else (1.0, 1.6):
+            for growth in (1.0, 1.6, 2.1, 4.0) if self._tilt.any() else (1.0, 1.6):
                 axes = np.zeros((n, len(keep)))
                 axes[keep] = frame * (size * growth)
                 found = self._returns(centre, axes, flows, start, decay)
