@@ -204,7 +204,7 @@ KERNEL_FAULTS = (
     Fault(
         "higher powers of the exponential are left out",
         "enclosure/exponential.py",
-        "        beyond[i] = (beyond[i] + tail) * UP + TINY\n",
+        "        beyond[i] = (beyond[i] + rest * largest) * UP + TINY\n",
         "        beyond[i] = TINY\n",
         (EXPONENTIAL,),
     ),

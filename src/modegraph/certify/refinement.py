@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..model.sets import Box
 from ..reach.chain import Chain, nonlinear_variable
 from ..reach.compiled import CompiledMode
+from .continuous import ContinuousReferences
 from .evidence import proved
 from .moments import moments_of
 from .relation import Part, Relation, whole_relation
@@ -28,7 +29,7 @@ WORTH = 0.01
 SMALL = 0.01
 """Share of all pairs that may stay undecided."""
 MOST_PARTS, DEEPEST = 64, 9
-NEAR, NEARER = 1.5, 0.98
+NEAR, NEARER = 1.25, 0.9
 """A target missed by less is worth cuts, as long as each comes nearer by this."""
 
 
@@ -92,23 +93,28 @@ class Links:
 
     def appear(self, until: float, progress: Callable[[str], None]) -> None:
         """Cut the starts where a target that no pair of references is certified for is nearly met."""
-        for j, relation in enumerate(self.relations):
-            source, target = self._pairs(relation, j)
-            gauge = relation.crossings(source, target).gauge
-            while 1.0 < gauge.min() <= NEAR and len(self.chains) < MOST_PARTS and time.monotonic() < until:
-                k = int(np.argmin(gauge))
-                at = source[k : k + 1], target[k : k + 1]
-                worst = max(self.chains, key=lambda chain: self._gauge(chain, j, *at))
+        for j in range(len(self.goals)):
+            source, target, gauge = self._nearest(j)
+            while 1.0 < gauge <= NEAR and len(self.chains) < MOST_PARTS and time.monotonic() < until:
+                worst = max(self.chains, key=lambda chain: self._gauge(chain, j, source, target))
                 if worst.shared or worst.piece.depth >= DEEPEST:
                     break
-                progress(f"{len(self.chains)} parts, a target is missed by {gauge[k] - 1.0:.2g} of its size")
+                progress(f"{len(self.chains)} parts, a target is missed by {gauge - 1.0:.2g} of its size")
                 before = self.chains
                 self._cut(worst, until)
-                closer = self.relations[j].crossings(source, target).gauge
-                if not closer.min() <= NEARER * gauge.min():
+                source, target, closer = self._nearest(j)
+                if not closer <= NEARER * gauge:
                     self.chains = before
                     break
                 gauge = closer
+
+    def _nearest(self, j: int) -> tuple[Floats, Floats, float]:
+        """The pair (1, ki), (1, kj) found nearest to being certified, and its gauge."""
+        sides = [(None,) if side is None else side for side in (self.region, self.goals[j].region)]
+        relation = self.relations[j]
+        best = ContinuousReferences(sides[0], sides[1], {(0, 0): relation}, False).best(None, None)
+        assert best is not None
+        return best[1][None], best[2][None], best[3]
 
     def _gauge(self, chain: Chain, j: int, source: Floats, target: Floats) -> float:
         """How near one chain comes to a target for one pair; 0 where it has no starts."""
