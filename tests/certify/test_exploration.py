@@ -7,7 +7,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.crossing import Missed
-from modegraph.certify.exploration import Exploration, Goal
+from modegraph.certify.exploration import Course, Exploration, Goal
 from modegraph.certify.proof import SwitchProof
 from modegraph.certify.region import Region
 from modegraph.certify.sinking import Sinking
@@ -68,7 +68,7 @@ def test_a_funnel_proves_a_switch_only_behind_flows_that_are_proved(top: float, 
 @pytest.mark.parametrize("top, proved", [(0.45, True), (0.6, False)])
 def test_all_time_is_proved_only_behind_flows_that_are_proved(top: float, proved: bool) -> None:
     flows, sinking = chain(top)
-    found = exploration(falling(0.4, top))._findings(flows, [], sinking, "", True)
+    found = exploration(falling(0.4, top))._findings(flows, [], Course(sinking), True)
     assert (found.safety is not None) == proved
     assert bool(found.unproved) != proved
     assert proved or found.safe_until < 0.5

@@ -24,8 +24,8 @@ from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
 from .evidence import lasting, sampled_violation, set_size, slack_until, unproved
-from .findings import Findings, better, merge, settle
-from .proof import SafetyProof, SwitchProof, least_slack, safe_together, together
+from .findings import Findings, better, filled, merge, too_wide
+from .proof import SafetyProof, SwitchProof, least_slack
 from .region import Region
 from .sinking import Arrival, Funnels, Sinking
 
@@ -40,6 +40,8 @@ DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 TOO_MUCH_FEEDBACK = 0.5
+NEXT_LOOK = 2.0
+"""Around a part an invariant set is looked for this many times later than around the whole, where that was in vain."""
 WORTH_A_TAIL = 0.7
 """An invariant set is looked for again when the reach set is smaller by this factor."""
 STALLED = 0.98
@@ -50,6 +52,20 @@ LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
 """Seconds of flow after which a mode without horizon and without a tail is given up."""
+
+
+@dataclass
+class Course:
+    """How far a chain of flows was followed.
+
+    ``tail``, or the ``reason`` there is none; whether the (first) flow wants to be restarted (``parked``);
+    when an invariant set around it was first looked for in vain (``looked``, seconds).
+    """
+
+    tail: Tail | Sinking | None = None
+    reason: str = ""
+    parked: bool = False
+    looked: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -89,6 +105,11 @@ class Exploration:
         self.continued: dict[Flow, Flow] = {}
         self.chains: dict[Flow, Findings] = {}
         self.linear = all(f.linear for f in fields)
+        self.common = all(f.autonomous for f in fields)
+        """Parked flows are to go on together, one alone is not looked at. Possible where time does not matter:
+        they go on from the latest of their instants, and their trajectories are there earlier."""
+        self.refused = False
+        """A flow was not parked because its remainder fed itself too much."""
         self._funnels: dict[tuple[float, ...], Funnels] = {}
 
     def funnels(self, piece: Piece) -> Funnels | None:
@@ -119,82 +140,35 @@ class Exploration:
 
     # -- one part --------------------------------------------------------------------------------
 
-    def decide(self, piece: Piece, wanted: Sequence[int], safety: bool = True) -> Findings:
-        """Decide the wanted goals, and the check for all starts."""
-        found = self.explore(piece, wanted, safety)
-        if found.parked:
-            chains = [self.chains[flow] for flow in found.parked]
-            parts = [part for part in chains if not part.parked]
-            open_chains = [part for part in chains if part.parked]
-            # Parts of a loop that does not depend on time may go on together, from the latest of
-            # their instants: their trajectories are there earlier.
-            together_ = all(f.autonomous for f in self.fields)
-            groups = [open_chains] if together_ else [[part] for part in open_chains]
-            parts += [part for group in groups if group for part in self._groups(group, found)]
-            self._finish(found, parts)
-        return found
-
-    def _try_alone(self, found: Findings) -> None:
+    def try_alone(self, found: Findings) -> None:
         """Go on with a parked flow until it is decided or wants another restart; undo the parking where
         that breaks down: its part of the starts is too large then."""
         flow = found.parked[0]
-        part = self._follow([self.continued[flow]], [flow], found, park=True)
+        part = self.follow([self.continued[flow]], [flow], found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
-            why = (
-                part.failure
-                or part.unproved
-                or f"at t = {part.last.time:.6g} s the disturbance has filled the reach set"
-            )
-            found.parked, found.waiting, found.waiting_safety = [], {}, None
-            found.failure = f"{why}; a smaller start set or disturbance would help"
+            found.unpark(part.failure or str(part.unproved or "") or filled(part.last))
             return
         self.chains[flow] = part
 
-    def _follow(self, flows: list[Flow], before: list[Flow], found: Findings, park: bool) -> Findings:
+    def follow(self, flows: list[Flow], before: list[Flow], found: Findings, park: bool) -> Findings:
+        """What flows show that go on from the ends of those before them, of what ``found`` waits for."""
         wanted = list(found.waiting)
         safety = found.waiting_safety is not None
-        tail, reason, parked = self._advance(flows, wanted, safety, self._end(), park=park)
-        part = self._findings(flows, wanted, tail, reason, safety, before=before)
-        if parked and proved_instants(flows[-1]) == len(flows[-1].steps):
+        course = self._advance(flows, wanted, safety, self.end(), park=park)
+        part = self._findings(flows, wanted, course, safety, before=before)
+        if course.parked and proved_instants(flows[-1]) == len(flows[-1].steps):
             part.parked = [*before, *flows]
         return part
 
-    def _groups(self, open_chains: list[Findings], found: Findings) -> list[Findings]:
-        """Chains that want another restart, together, or in halves where all of them are too much."""
-        ends = [part.parked[-1] for part in open_chains]
-        before = [flow for part in open_chains for flow in part.parked]
-        following = self.continued[ends[0]] if len(ends) == 1 else self._again(ends, self._end())
-        if following is None:
-            part = Findings(flow=ends[0], last=ends[-1], failure="the reach set cannot be enclosed again")
-        else:
-            part = self._follow([following], before, found, park=False)
-        missing = [j for j in found.waiting if j not in part.proofs and any(j not in c.proofs for c in open_chains)]
-        decided = not missing and (found.waiting_safety is None or part.safety is not None)
-        if decided or len(open_chains) == 1 or time.monotonic() > self.deadline:
-            proofs = [together([c.proofs.get(j) for c in open_chains]) for j in found.waiting]
-            for j, proof in zip(found.waiting, proofs, strict=True):
-                if proof is not None:
-                    part.proofs[j] = proof
-            return [part]
-        half = len(open_chains) // 2
-        return [*self._groups(open_chains[:half], found), *self._groups(open_chains[half:], found)]
-
-    def _finish(self, found: Findings, parts: Sequence[Findings]) -> None:
-        for j, others in found.waiting.items():
-            settle(found, j, together([*others, *(part.proofs.get(j) for part in parts)]), parts)
-        if found.waiting_safety is not None:
-            found.safety = safe_together([*found.waiting_safety, *(part.safety for part in parts)])
-        for part in parts:
-            found.failure, found.unproved = part.failure, part.unproved
-            found.tail_reason, found.safe_until = part.tail_reason, max(found.safe_until, part.safe_until)
-
-    def explore(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0) -> Findings:
+    def explore(
+        self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0, looked: float = 0.0
+    ) -> Findings:
         """Decide the wanted goals (and the check) on one part, cutting it where that helps."""
         self.parts += 1
-        found = self._run(piece, wanted, safety, effort)
-        if found.parked:
-            self._try_alone(found)
+        found = self._run(piece, wanted, safety, effort, looked)
+        if found.parked and not self.common:
+            self.try_alone(found)
         left = [j for j in wanted if j not in found.proofs and j not in found.waiting]
         again, check_again = self._worth_refining(found, left, safety)
         done = not again and not check_again
@@ -202,7 +176,7 @@ class Exploration:
             return found
         cut_short = bool(found.failure or found.unproved)
         if cut_short and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
-            second = self.explore(piece, again, check_again, effort + 1)
+            second = self.explore(piece, again, check_again, effort + 1, found.looked)
             return merge(found, [second], again, check_again)
         if piece.depth >= DEEPEST_CUT or piece.variables == 0:
             return found
@@ -212,7 +186,9 @@ class Exploration:
         # No halves: the piece is proved to hold no start, though only now that it is cut.
         pieces = piece.split(variable)
         children: list[Findings] = []
-        for part in in_parallel([partial(self.explore, child, again, check_again, effort) for child in pieces]):
+        for part in in_parallel(
+            [partial(self.explore, child, again, check_again, effort, found.looked) for child in pieces]
+        ):
             children.append(part)
             lost = not part.empty and not better(part, found, again, check_again)
             if lost and piece.chart.sublevel is None and flow.astride is None:
@@ -231,37 +207,42 @@ class Exploration:
             hopeful |= set(left)
         return sorted(hopeful), safety and found.safety is None and cut_short
 
-    def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int) -> Findings:
+    def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int, looked: float) -> Findings:
         order = self.order(piece, effort)
         flow = Flow(
             self.fields, piece, self.w_centre, self.w_radius, order,
             names=self.names, reset=self.reset, stops=self.stops, longest_step=self._longest_step(),
         )  # fmt: skip
-        tail, reason, parked = self._advance([flow], wanted, safety, self._end(), park=True)
-        found = self._findings([flow], wanted, tail, reason, safety)
-        if parked and proved_instants(flow) == len(flow.steps):
+        course = self._advance([flow], wanted, safety, self.end(), park=True, looked=looked)
+        found = self._findings([flow], wanted, course, safety)
+        found.looked = course.looked
+        if course.parked and proved_instants(flow) == len(flow.steps):
+            if self.common and flow.feedback > TOO_MUCH_FEEDBACK:
+                self.refused = True
+                found.failure = too_wide(filled(flow))
+                return found
             found.parked = [flow]
             found.waiting = {j: [] for j in wanted if j not in found.proofs}
             if safety and found.safety is None:
                 found.waiting_safety = []
         return found
 
-    def _end(self) -> float:
+    def end(self) -> float:
+        """Instant at which a flow is given up, seconds."""
         return min(self.until, LONGEST if self.horizon is None else self.horizon)
 
     def _advance(
-        self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool
-    ) -> tuple[Tail | Sinking | None, str, bool]:
+        self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool, looked: float = 0.0
+    ) -> Course:
         """Extend a chain of flows until everything is decided or nothing more can be expected.
 
-        Returns the tail, or why there is none, and whether the (first) flow wants to be restarted;
-        with ``park`` it stops there, else it restarts and goes on.
+        With ``park`` it stops where the (first) flow wants to be restarted, else it restarts and goes on.
+        ``looked``: when an invariant set was first looked for in vain around a larger part of the starts.
         """
         flow = flows[-1]
         start = self.fields[-1].start
-        tail: Tail | Sinking | None = None
+        course = Course(looked=looked)
         decay = np.inf
-        reason = ""
         previous = dict.fromkeys(wanted, np.inf)
         pending = list(wanted)
         checkpoint = 8
@@ -277,11 +258,13 @@ class Exploration:
                 break
             taken += 1
             if not self.linear and flow.wants_restart():
-                following = self._again([flow], end, first=len(flows) == 1 and flow.piece.chart.original)
+                if park and self.common:
+                    return replace(course, parked=True)
+                following = self.again([flow], end, first=len(flows) == 1 and flow.piece.chart.original)
                 if following is not None:
                     if park:
                         self.continued[flow] = following
-                        return tail, reason, True
+                        return replace(course, parked=True)
                     flows.append(following)
                     flow = following
             if taken < checkpoint and flow.time < end:
@@ -296,44 +279,51 @@ class Exploration:
             patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 1
             passing = park and pending and disturbed and idle < patience
             size = set_size(flow)
-            if tail is None and flow.time >= start and not passing and size < WORTH_A_TAIL * tried:
-                tried = size
+            due = flow.time >= start and (not pending or flow.time >= NEXT_LOOK * looked)
+            if course.tail is None and due and not passing and size < WORTH_A_TAIL * tried:
                 search = TailSearch(
                     flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
                 )
                 outcome = search.attempt([flow])
                 if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
-                    tail, decay = outcome, outcome.decay
+                    course.tail, decay = outcome, outcome.decay
                 else:
-                    reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
+                    if np.isinf(tried):
+                        course.looked = flow.time
+                    course.reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
                     sunk = self._sink(flow, pending) if not pending else None
                     if isinstance(sunk, Sinking):
-                        tail, decay = sunk, sunk.tail().decay
-                    elif sunk is not None and sunk.reason.partition(":")[0] not in reason:
+                        course.tail, decay = sunk, sunk.tail().decay
+                    elif sunk is not None and sunk.reason.partition(":")[0] not in course.reason:
                         # Not the same again with other numbers.
-                        reason = f"{reason}; no funnel either: {sunk.reason}"
-            if not pending and (tail is not None or not safety):
+                        course.reason = f"{course.reason}; no funnel either: {sunk.reason}"
+                tried = size
+            if not pending and (course.tail is not None or not safety):
                 break
-            settled = tail is not None and np.isfinite(decay) and flow.time > tail.start + SETTLING / decay
+            settled = (
+                course.tail is not None and np.isfinite(decay) and flow.time > course.tail.start + SETTLING / decay
+            )
             if settled and stalled:
                 sinking = self._sink(flow, pending)
                 if isinstance(sinking, Sinking) and any(self._arrives(sinking, j) for j in pending):
-                    tail = sinking
+                    course.tail = sinking
                     break
                 if flow.frame is not None or self.framed[0].frame is None:
                     break
-                following = self._again([flow], end)
+                if park and self.common:
+                    return replace(course, parked=True)
+                following = self.again([flow], end)
                 if following is None:
                     break
                 if park:
                     self.continued[flow] = following
-                    return tail, reason, True
+                    return replace(course, parked=True)
                 flows.append(following)
                 flow = following
             previous = {j: now[j] for j in pending}
-        return tail, reason, False
+        return course
 
-    def _again(self, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
+    def again(self, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
         """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
 
         The first holds out longer while the set is large, the second is tighter in the end, and at
@@ -358,7 +348,7 @@ class Exploration:
 
     def _arrives(self, sinking: Sinking, j: int) -> bool:
         goal = self.goals[j]
-        return goal.reset is None and isinstance(sinking.arrival(goal.region, self._end()), Arrival)
+        return goal.reset is None and isinstance(sinking.arrival(goal.region, self.end()), Arrival)
 
     def _longest_step(self) -> float:
         """A crossing is looked for at the ends of steps only: enough of them within the horizon."""
@@ -379,8 +369,7 @@ class Exploration:
         self,
         flows: Sequence[Flow],
         wanted: Sequence[int],
-        tail: Tail | Sinking | None,
-        tail_reason: str,
+        course: Course,
         safety: bool,
         before: Sequence[Flow] = (),
     ) -> Findings:
@@ -389,7 +378,8 @@ class Exploration:
         The first starts around the ends of the flows ``before``, if there are any.
         """
         flow = flows[-1]
-        found = Findings(flow=flows[0], last=flow, tail_reason=tail_reason)
+        found = Findings(flow=flows[0], last=flow, tail_reason=course.reason)
+        tail = course.tail
         # The first flow that is not proved to its end, if there is one.
         short = next((f for f in flows if proved_instants(f) < len(f.steps)), flow)
         proved = proved_instants(short)
@@ -450,7 +440,7 @@ class Exploration:
         # The search goes on by the bounds of whole steps: starts and breakpoints may lack a proof in any flow.
         if sinking is None or goal.reset is not None or any(proved_instants(f) < len(f.steps) for f in flows):
             return best
-        arrival = sinking.arrival(goal.region, self._end())
+        arrival = sinking.arrival(goal.region, self.end())
         if isinstance(arrival, Missed):
             closer = replace(arrival, start=best.start, hopeful=best.hopeful, sampled=best.sampled)
             return closer if arrival.gauge < best.gauge else best

@@ -28,11 +28,28 @@ class Findings:
     """The part is proved to hold no start: the others decide without it."""
     flow: Flow | None = None
     last: Flow | None = None
+    looked: float = 0.0
+    """When an invariant set was first looked for in vain, seconds."""
     parked: list[Flow] = field(default_factory=list)
     """Flows that wait for a common restart, because the disturbance has filled them."""
     waiting: dict[int, list[SwitchProof]] = field(default_factory=dict)
     """Goals that depend on the parked flows, with the proofs of the other parts."""
     waiting_safety: list[SafetyProof] | None = None
+
+    def unpark(self, why: str) -> None:
+        """Nothing waits any more: the part is too large, for this reason."""
+        self.parked, self.waiting, self.waiting_safety = [], {}, None
+        self.failure = too_wide(why)
+
+
+def filled(flow: Flow) -> str:
+    """Why a flow cannot go on whose remainder feeds itself."""
+    return f"at t = {flow.time:.6g} s the disturbance has filled the reach set"
+
+
+def too_wide(why: str) -> str:
+    """What would help a part that is too large."""
+    return f"{why}; a smaller start set or disturbance would help"
 
 
 def better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:

@@ -11,6 +11,7 @@ from ..model.mode import Mode
 from ..model.sets import Set, Sublevel
 from ..model.sets.scaled import scaled
 from ..reach.compiled import CompiledMode, compile_mode
+from .decision import Decision
 from .unit import exploration_of
 
 LARGEST, SMALLEST = 2.0**20, 2.0**-20
@@ -111,7 +112,7 @@ class _Search:
         try:
             compiled = replace(self.compiled, start=scaled(self.shape, scale))
             exploration = exploration_of(compiled, {}, self.mode.horizon, deadline, lambda text: None)
-            return exploration.decide(compiled.whole(), []).safety is not None
+            return Decision(exploration).decide(compiled.whole(), []).safety is not None
         except ModegraphError:
             # A limit of the engine: the model itself was checked when it was compiled.
             return False

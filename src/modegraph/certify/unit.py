@@ -29,8 +29,10 @@ from .counterexample import (
     trapped_in,
 )
 from .crossing import Nearest
+from .decision import Decision
 from .evidence import slack_until, width_over_time
-from .exploration import Exploration, Findings, Goal
+from .exploration import Exploration, Goal
+from .findings import Findings
 from .proof import SwitchProof, certified_check, certified_switch
 from .region import Region
 from .sublevel_region import target_region
@@ -166,7 +168,7 @@ class _Unit:
         scene = scene_of(self.mode, self.compiled)
         self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])
         wanted = [k for k in self.goals if k not in self.verdicts]
-        found = exploration.decide(compiled.whole(), wanted, safety=not self.switches_only)
+        found = Decision(exploration).decide(compiled.whole(), wanted, safety=not self.switches_only)
         for k in wanted:
             if k in found.proofs:
                 self.verdicts[k] = self._switch(k, found.proofs[k])
