@@ -19,7 +19,7 @@ from ..reach.field import Field
 from ..reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
 from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
-from ..reach.restart import WIDE_GAP, restarted
+from ..reach.restart import WIDE_GAP, mostly_remainder, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
@@ -257,6 +257,8 @@ class Exploration:
                 # Nothing later can be used for a switch; the check has failed on this part.
                 break
             taken += 1
+            if park and self.common and disturbed and flow.feedback > TOO_MUCH_FEEDBACK:
+                return replace(course, parked=True)
             if not self.linear and flow.wants_restart():
                 if park and self.common:
                     return replace(course, parked=True)
@@ -332,7 +334,8 @@ class Exploration:
         """
         flow = last[0]
         framed = not first or mode_gap(flow.slope) > WIDE_GAP
-        following = restarted(last, self.framed if framed else self.fields)
+        compact = self.common and (flow.generation == 0 or mostly_remainder(flow))
+        following = restarted(last, self.framed if framed else self.fields, compact=compact)
         started = following is not None and following.time < end and following.advance(end)
         if following is not None and started and proved_instants(following) == len(following.steps):
             return following

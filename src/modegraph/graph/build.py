@@ -11,6 +11,8 @@ from numbers import Real
 from threading import Lock
 from typing import Any
 
+import numpy as np
+
 from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
@@ -20,13 +22,17 @@ from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.classes import Classes, Link
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.graph.progress import Progress, reporting
-from modegraph.model.closed_loop import close_loop
+from modegraph.model.closed_loop import close_loop, mode_start
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 from modegraph.model.validation import validate_modes
 
 DEFAULT_BUDGET = 600.0
 """Seconds of work when ``budget`` is not given."""
+
+
+SMALL = 1e-9
+"""Widths that are compared are at least so large."""
 
 
 class _Stopped(Exception):
@@ -164,6 +170,14 @@ def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]
     return units
 
 
+def _size(unit: _Unit) -> tuple[bool, float]:
+    """Classes, then wide starts, take longest: begun first, they keep all cores busy to the end."""
+    if _is_class(unit.mode):
+        return True, 0.0
+    lo, hi = mode_start(unit.mode, unit.parameter).bounding_box()
+    return False, float(np.log(np.asarray(hi) - np.asarray(lo) + SMALL).sum())
+
+
 def _is_class(mode: Mode | Target) -> bool:
     return isinstance(mode, Mode) and mode.reference.region is not None
 
@@ -228,7 +242,7 @@ class _Work:
         self.report(0, len(self.units), "")
         pools = ThreadPoolExecutor(max_workers=threads, thread_name_prefix="modegraph")
         with single_threaded_algebra(), pools as pool:
-            futures = {pool.submit(self._unit, unit): unit for unit in self.units}
+            futures = {pool.submit(self._unit, unit): unit for unit in sorted(self.units, key=_size, reverse=True)}
             try:
                 self._watch(futures)
             except KeyboardInterrupt:
@@ -236,7 +250,8 @@ class _Work:
             except BaseException:
                 self._stop(futures)
                 raise
-        return [self._result(future, unit) for future, unit in futures.items()]
+        results = {unit: self._result(future, unit) for future, unit in futures.items()}
+        return [results[unit] for unit in self.units]
 
     def _watch(self, futures: dict[Future[_Result], _Unit]) -> None:
         """Wait for all units; the error of a wrong model ends it at once."""
@@ -258,10 +273,6 @@ class _Work:
             # An equal share of the time that is left: a hard unit cannot starve the others.
             rounds = math.ceil(self.waiting / self.threads)
             self.waiting -= 1
-        now = time.monotonic()
-        if now >= self.end:
-            return unit.undecided(f"the budget of {self.budget:g} s ended before this mode was examined")
-        deadline = now + (self.end - now) / rounds
 
         def progress(text: str = "") -> None:
             if self.stopped:
@@ -271,6 +282,10 @@ class _Work:
 
         try:
             with one_core():
+                now = time.monotonic()
+                if now >= self.end:
+                    return unit.undecided(f"the budget of {self.budget:g} s ended before this mode was examined")
+                deadline = now + (self.end - now) / rounds
                 return _examined(unit, deadline, progress, self.thorough)
         except (ModegraphError, _Stopped):
             raise

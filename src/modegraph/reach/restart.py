@@ -58,6 +58,12 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool =
     )
 
 
+def mostly_remainder(flow: Flow) -> bool:
+    """Whether the remainder is larger than the polynomial part in every state: then that is not worth variables."""
+    p, G = flow.state_set(len(flow.steps))
+    return bool((generator_box(G) > np.abs(p[:, 1:]).sum(axis=1)).all())
+
+
 def halved(flow: Flow, variable: int) -> list[Flow]:
     """Flows that start where a restarted one does, from the halves of its piece: together they hold all of it."""
     same: dict[str, Any] = {"fields": flow.fields, "order": flow.order, "generation": flow.generation}
