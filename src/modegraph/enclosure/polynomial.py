@@ -16,15 +16,16 @@ KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy
 def _accumulate(c, a, da, b, db, dmax, factor, product, offset, start, degree):
     if da > dmax:
         da = dmax
-    for i in range(start[da + 1]):
+    # Unsigned indices: signed ones are checked for counting from the end (a quarter of the time).
+    for i in range(np.uint64(start[da + 1])):
         x = a[i]
         if x != 0.0:
             x *= factor
             d = dmax - degree[i]
             if db < d:
                 d = db
-            o = offset[i]
-            for j in range(start[d + 1]):
+            o = np.uint64(offset[i])
+            for j in range(np.uint64(start[d + 1])):
                 c[product[o + j]] += x * b[j]
 
 
