@@ -278,7 +278,7 @@ class Exploration:
             stalled = all(now[j] > STALLED * previous[j] for j in pending)
             idle = idle + 1 if stalled else 0
             # Enclosed again, a flow would go on without what was found.
-            patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 1
+            patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 2
             passing = park and pending and disturbed and idle < patience
             size = set_size(flow)
             due = flow.time >= start and (not pending or flow.time >= NEXT_LOOK * looked)

@@ -148,6 +148,8 @@ class Flow:
             G[np.arange(n), np.arange(n), 0] = slack * (1.0 + 4.0 * UNIT)
         self.p0, self.G0 = p, G
         self._p, self._G = p, G
+        self.remainder = generator_box(G)
+        """A box (n,) of the last remainder, in the coordinates of the fields."""
         self._ebox = np.zeros(n)
         self._ybox = np.zeros(n)
         self._energy = np.zeros(seen)
@@ -284,7 +286,7 @@ class Flow:
         self.feedback = float(control[4])
         self._ybox = rest
         self._record(t1, p, G, tube, bend, seen)
-        if not np.isfinite(p).all() or self._runs_away(G):
+        if not np.isfinite(p).all() or self._runs_away():
             self._fail(fld, NO_CONTRACTION, 0)
             return False
         return True
@@ -306,9 +308,9 @@ class Flow:
             return FINE_RATE_CAP
         return DISTURBED_RATE_CAP if fld.states <= MANY_STATES else CAREFUL_RATE_CAP
 
-    def _runs_away(self, G: Floats) -> bool:
+    def _runs_away(self) -> bool:
         """Whether the remainder has begun its last growth: it feeds itself while the steps shrink."""
-        size = float(generator_box(G).max(initial=0.0))
+        size = float(self.remainder.max(initial=0.0))
         self._sizes.append(size)
         if size > OUTGROWN * (1.0 + np.abs(self._p).sum(axis=1).max()):
             return True
@@ -370,6 +372,7 @@ class Flow:
             # Only the last remainder goes on; of the others the targets need no more than this.
             self.steps[-2].G = thinned(self.steps[-2].G, 0 if self.lean else 1 + self.piece.variables)
         self._p, self._G, self._ebox, self.time = step.p, step.G, step.tube, step.end
+        self.remainder = generator_box(step.G)
         self._energy, self._energy_radius = step.energy, step.energy_radius
         if step.end >= self.fields[self.segment].end:
             self.segment += 1
@@ -417,7 +420,7 @@ class Flow:
         )  # fmt: skip
 
     def _fail(self, fld: Field, status: int, node: int) -> None:
-        widths = generator_box(self._G)
+        widths = self.remainder
         if self.frame is not None:
             widths = np.abs(self.frame.V) @ widths
         worst = self.names[int(np.argmax(widths))] if len(widths) else ""
@@ -443,9 +446,8 @@ class Flow:
         least = RESTART_FEEDBACK if self.generation < 2 else LATE_FEEDBACK
         if not self.w_radius.any() or len(self.steps) < self.next_restart or self.feedback < least:
             return False
-        z = generator_box(self._G)
         own = np.abs(self._p[:, 1:]).sum(axis=1)
-        return bool((z > RESTART_SHARE * own).all())
+        return bool((self.remainder > RESTART_SHARE * own).all())
 
     # -- what it says ----------------------------------------------------------------------------
 

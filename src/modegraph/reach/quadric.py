@@ -31,10 +31,13 @@ class Quadric:
         """
         gauge = self._gauges(bounds, p, generators, [self.T] * len(p))
         # The norm does not change under a rotation, but boxes around zonotopes do: try their own axes too.
-        rotated, loose = self._principal(p, generators)
+        # They gain at most the square root of n: nothing, where that would not bring a set to the least.
+        near = np.flatnonzero(~(gauge > np.sqrt(self.dim) * max(1.0, np.nanmin(gauge, initial=np.inf))))
+        some = [generators[k] for k in near.tolist()]
+        rotated, loose = self._principal(p[near], some)
         if rotated:
-            turned = self._gauges(bounds, p, generators, rotated) * loose
-            gauge = np.fmin(gauge, turned)
+            turned = self._gauges(bounds, p[near], some, rotated) * loose
+            gauge[near] = np.fmin(gauge[near], turned)
         return np.asarray(np.where(np.isnan(gauge), np.inf, gauge))
 
     def _principal(self, p: Floats, generators: Sequence[Floats]) -> tuple[list[Floats], Floats]:

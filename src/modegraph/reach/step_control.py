@@ -22,8 +22,10 @@ def feeding_cap(piece: Piece, outcome: Any) -> float:
     ``outcome`` is what ``flow_step`` returned.
     """
     _, _, _, G, _, _, rest, control = outcome
+    if not piece.chart.parameters or control[4] < 0.5 or control[3] <= SLOW_RATE:
+        return LONGER
     z = generator_box(G)
-    if not piece.chart.parameters or control[4] < 0.5 or control[3] <= SLOW_RATE or not (z > 0.0).all():
+    if not (z > 0.0).all():
         return LONGER
     feeding = float((rest / z).max()) * float(control[4])
     # What a step adds to the rate grows with the square of its length, or faster; the rest stays.

@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 FLOOR = 0.3
 """Least semi-axis of B relative to the largest, so that its aspect ratio is harmless."""
 
+TOO_MUCH_FEEDBACK = 0.6
+"""A candidate set whose remainder feeds itself by this share is given up: soon it grows without bound."""
+
 
 @dataclass(frozen=True)
 class Tail:
@@ -218,6 +221,8 @@ class TailSearch:
                 return TailFailure(f"constraint '{bad}' cannot be proved on the candidate set")
             if self._inside(flow, axes, centre):
                 return self._tail(flow, start, decay)
+            if flow.feedback > TOO_MUCH_FEEDBACK:
+                return TailFailure("the disturbance fills the candidate set before it returns")
         return TailFailure("the candidate set does not return into itself")
 
     def _half_widths(self, flow: Flow, axes: Floats, centre: Floats) -> Floats:
