@@ -27,6 +27,8 @@ from .verdict import Unproved, Witness
 Floats = NDArray[np.float64]
 
 POINT_ORDER = Order(1, 0)
+FLOAT_STEPS, MOST_FLOAT_STEPS = 200, 1500
+"""Steps of a trajectory in floats, at least, and at most."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,51 @@ class PointRun:
         names = list(self.scene.unknowns)
         w = self.w if len(self.w) else None
         return Witness(self.x0, w, dict(zip(names, self.d.tolist(), strict=True)), time, kind, r_i, r_j)  # type: ignore[arg-type]
+
+
+def worth_following(
+    scene: Scene, runs: Sequence[tuple[Floats, Floats]], d: Floats, regions: Sequence[Region], end: float, safety: bool
+) -> list[bool]:
+    """Which runs (start, constant disturbance) may refute anything, seen from trajectories in floats.
+
+    A run that enters every target cannot, unless it breaks a constraint on the way. Where floats cannot tell - too
+    many steps, a target over a memory - all may. ``safety``: a constraint broken later counts, too.
+    """
+    n = scene.fields[0].states
+    if scene.reset is not None or not runs or any(region.dim != n for region in regions):
+        return [True] * len(runs)
+    x = np.array([x0 for x0, _ in runs]).T
+    inputs = np.zeros((scene.fields[0].variables, len(runs)))
+    inputs[scene.fields[0].first_w : scene.fields[0].first_d] = np.array([w for _, w in runs]).T
+    inputs[scene.fields[0].first_d :] = d[:, None]
+    entered = np.zeros((len(regions), len(runs)), bool)
+    broken = np.zeros(len(runs), bool)
+    t, taken = 0.0, 0
+    for fld in scene.fields:
+        rates, slopes, observed = Evaluator(fld.rates), Evaluator(fld.jacobian), Evaluator(fld.observed)
+
+        def at(f: Evaluator, t: float, x: Floats, fld: Field = fld) -> Floats:
+            inputs[:n], inputs[fld.time_index] = x, t
+            return np.asarray(f(inputs))
+
+        while t < min(end, fld.end):
+            J = at(slopes, t, x)[: n * n].T.reshape(-1, n, n)
+            if not np.isfinite(J).all() or taken > MOST_FLOAT_STEPS:
+                return [True] * len(runs)
+            for k, region in enumerate(regions):
+                entered[k] |= region.point_gauges(x.T) <= 1.0
+            before = ~entered.all(axis=0)
+            faces = at(observed, t, x)[: len(fld.faces)]
+            broken |= (faces > -1e-6).any(axis=0) & (before | safety)
+            if not before.any() and not safety:
+                break
+            h = min(end - t, fld.end - t, end / FLOAT_STEPS, 1.0 / max(1e-9, np.abs(J).sum(axis=2).max()))
+            a = at(rates, t, x)
+            b = at(rates, t + 0.5 * h, x + 0.5 * h * a)
+            c = at(rates, t + 0.5 * h, x + 0.5 * h * b)
+            x = x + h / 6.0 * (a + 2.0 * b + 2.0 * c + at(rates, t + h, x + h * c))
+            t, taken = t + h, taken + 1
+    return [bool(v) for v in broken | ~entered.all(axis=0)]
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class Exploration:
     def __init__(
         self,
         fields: Sequence[Field],
-        framed: Sequence[Field],
+        framed: Callable[[], Sequence[Field]],
         goals: Mapping[int, Goal],
         *,
         plant: int,
@@ -95,9 +96,12 @@ class Exploration:
         tick: Callable[[str], None],
         until: float = np.inf,
     ) -> None:
-        """``until``: seconds after which nothing is looked at, the steps being those of the horizon."""
+        """``framed`` makes the fields in the frame of the modes; ``until``: seconds after which nothing is
+        looked at, the steps being those of the horizon."""
         self.until = until
-        self.fields, self.framed, self.goals, self.plant = fields, framed, goals, plant
+        self.fields, self.goals, self.plant = fields, goals, plant
+        self._make_framed, self._one_at_a_time = framed, Lock()
+        self._framed: Sequence[Field] | None = None
         self.w_centre, self.w_radius = w
         self.names, self.reset, self.horizon, self.stops = names, reset, horizon, stops
         self.deadline, self.tick = deadline, tick
@@ -111,6 +115,14 @@ class Exploration:
         self.refused = False
         """A flow was not parked because its remainder fed itself too much."""
         self._funnels: dict[tuple[float, ...], Funnels] = {}
+
+    @property
+    def framed(self) -> Sequence[Field]:
+        """The fields in the frame of the modes: few loops ever need them."""
+        with self._one_at_a_time:
+            if self._framed is None:
+                self._framed = self._make_framed()
+            return self._framed
 
     def funnels(self, piece: Piece) -> Funnels | None:
         """Funnels for the unknowns of a piece; None where the loop never stops depending on time."""

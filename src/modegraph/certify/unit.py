@@ -27,6 +27,7 @@ from .counterexample import (
     moved_inside,
     scene_of,
     trapped_in,
+    worth_following,
 )
 from .crossing import Nearest
 from .decision import Decision
@@ -40,6 +41,8 @@ from .verdict import Approach, Floats, Status, Verdict, Witness
 
 POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""
+LONGEST_RUN = 200.0
+"""The same in seconds, for a mode without horizon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +99,7 @@ def exploration_of(
     """The exploration of a compiled mode."""
     return Exploration(
         compiled.fields,
-        compiled.framed_fields(),
+        compiled.framed_fields,
         goals,
         plant=compiled.plant,
         w=(compiled.w_centre, compiled.w_radius),
@@ -245,11 +248,15 @@ class _Unit:
         if not left and self.check is not None:
             return
         d = scene.constants()
-        starts = candidate_starts(scene, self._hints(found, left))
-        for w in scene.disturbances():
-            for x0 in starts[:4]:
-                if (not left and self.check is not None) or time.monotonic() > self.deadline:
-                    return
+        starts = candidate_starts(scene, self._hints(found, left))[:4]
+        runs = [(x0, w) for w in scene.disturbances() for x0 in starts]
+        end = LONGEST_RUN if self.horizon is None else self.horizon
+        regions = [self.goals[k].region for k in left]
+        worth = worth_following(scene, runs, d, regions, end, safety=self.check is None)
+        for (x0, w), fine in zip(runs, worth, strict=True):
+            if (not left and self.check is not None) or time.monotonic() > self.deadline:
+                return
+            if fine:
                 left = self._try_run(PointRun(scene, x0, w, d), left)
 
     def _hints(self, found: Findings, left: Sequence[int]) -> list[Floats]:
@@ -288,7 +295,7 @@ class _Unit:
         search: TailSearch | None = None
         last = run.flow.fields[-1]
         order = Order(1, 0) if last.linear else Order(3, 2)
-        end = 200.0 if self.horizon is None else self.horizon
+        end = LONGEST_RUN if self.horizon is None else self.horizon
         checkpoint = 30
         while run.violation is None and run.flow.time < end and len(run.flow.steps) < POINT_STEPS:
             if time.monotonic() > self.deadline:

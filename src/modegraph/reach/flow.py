@@ -381,28 +381,23 @@ class Flow:
     def _observe(self, fld: Field, h: float, tube: Floats) -> tuple[Floats, Floats, float, Floats]:
         faces = len(fld.faces)
         ends, slack = self._observed(fld, h, tube, self.seen, 3)
-        upper = self._face_upper(self.seen_bounds, ends, slack, faces)
+        errors = ends[:2, faces + 1 :]
+        tops = self.seen_bounds.upper(np.concatenate([ends[:2, :faces], errors, -errors], axis=1)).max(axis=0)
+        upper = tops[:faces] + slack[:faces, 0]
         if faces and not (upper <= 0.0).all():
             fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, TIME_DEGREE)
-            fine = self._face_upper(self.bounds, fine_ends, fine_slack, faces)
+            fine = self.bounds.upper(fine_ends[:2, :faces]).max(axis=0) + fine_slack[:faces, 0]
             for i in np.flatnonzero(~(fine <= 0.0)):
                 if np.isfinite(fine_slack[i, 0]):
                     limit = -fine_slack[i, 0]
-                    tops = [self.bounds.refined_upper(fine_ends[s, i], limit) for s in (0, 1)]
-                    fine[i] = min(fine[i], max(tops) + fine_slack[i, 0])
+                    refined = [self.bounds.refined_upper(fine_ends[s, i], limit) for s in (0, 1)]
+                    fine[i] = min(fine[i], max(refined) + fine_slack[i, 0])
             upper = np.minimum(upper, fine)
         upper = np.where(np.isnan(upper), np.inf, upper)
         # Ends are added and compared in floats: one rounding each.
         upper = upper + 4.0 * UNIT * np.abs(upper)
-        errors = ends[:2, faces + 1 :]
-        both = np.maximum(self.seen_bounds.upper(errors), self.seen_bounds.upper(-errors)).max(axis=0)
-        tracking = both + slack[faces + 1 :, 0]
+        tracking = tops[faces:].reshape(2, -1).max(axis=0) + slack[faces + 1 :, 0]
         return upper, ends[2, faces], float(slack[faces, 1]), tracking
-
-    def _face_upper(self, bounds: PolynomialBounds, ends: Floats, slack: Floats, faces: int) -> Floats:
-        if not faces:
-            return np.zeros(0)
-        return np.asarray(bounds.upper(ends[:2, :faces]).max(axis=0) + slack[:faces, 0])
 
     def _observed(self, fld: Field, h: float, tube: Floats, q: int, K: int) -> tuple[Floats, Floats]:
         o = fld.observed

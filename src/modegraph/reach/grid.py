@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 GRID = 2.0**-36
 """Instants between breakpoints are multiples of this (seconds)."""
@@ -11,7 +10,8 @@ GRID = 2.0**-36
 
 def is_exact(t0: float, t1: float) -> bool:
     """Whether the double t1 - t0 is exactly the difference."""
-    return Fraction(t1) - Fraction(t0) == Fraction(t1 - t0)
+    # A sum rounded once is zero only if it is.
+    return math.fsum((t1, -t0, -(t1 - t0))) == 0.0
 
 
 def next_instant(t: float, h: float, limit: float) -> float:

@@ -62,5 +62,5 @@ def _scaled(tape: Tape, first: int, last: int) -> Tape:
         const_rad=np.concatenate([tape.const_rad, np.zeros(more)]),
         variables=np.append(tape.variables, factor),
         outputs=outputs,
-        labels=(*tape.labels, "own time", *(tape.labels[row[1]] for row in rows[1:])),
+        describe=lambda: (*tape.labels, "own time", *(tape.labels[row[1]] for row in rows[1:])),
     )
