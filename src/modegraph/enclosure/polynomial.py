@@ -62,3 +62,14 @@ def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
             c[i] = work[i]
         c[0] += series[k]
     return dc
+
+
+@njit(**KERNEL)
+def absolute_sums(G):
+    """Sums (n,) of |G[g, i, k]| over g and k."""
+    out = np.zeros(G.shape[1])
+    for g in range(G.shape[0]):
+        for i in range(G.shape[1]):
+            for k in range(G.shape[2]):
+                out[i] += abs(G[g, i, k])
+    return out

@@ -133,8 +133,8 @@ def generator_sizes(A: Floats, generators: Sequence[Floats]) -> Floats:
     out = np.zeros((len(generators), len(A)))
     for k, G in enumerate(generators):
         if len(G):
-            product = np.einsum("fi,gin->fgn", A, G[:, :n])
-            size = np.abs(G[:, :n]).sum(axis=(0, 2))
+            columns = np.moveaxis(G[:, :n], 1, 0).reshape(n, -1)
+            size = np.abs(columns).sum(axis=1)
             slack = 4.0 * (n + 2 + math.log2(G.size + 1)) * UNIT * (np.abs(A) @ size)
-            out[k] = np.abs(product).sum(axis=(1, 2)) * (1.0 + 2.0 * G.size * UNIT) + slack
+            out[k] = np.abs(A @ columns).sum(axis=1) * (1.0 + 2.0 * G.size * UNIT) + slack
     return out
