@@ -152,17 +152,22 @@ class PointRun:
         return Witness(self.x0, w, dict(zip(names, self.d.tolist(), strict=True)), time, kind, r_i, r_j)  # type: ignore[arg-type]
 
 
-def worth_following(
+def followed_in_floats(
     scene: Scene, runs: Sequence[tuple[Floats, Floats]], d: Floats, regions: Sequence[Region], end: float, safety: bool
-) -> list[bool]:
-    """Which runs (start, constant disturbance) may refute anything, seen from trajectories in floats.
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which runs (start, constant disturbance) may refute what, seen from trajectories in floats: a guess.
 
-    A run that enters every target cannot, unless it breaks a constraint on the way. Where floats cannot tell - too
-    many steps, a target over a memory - all may. ``safety``: a constraint broken later counts, too.
+    Returns
+    -------
+    outside : (regions, runs), the target is never entered
+    broken : (runs,), a constraint is broken before all targets are entered, or with ``safety`` at any time
+
+    All are True where floats cannot tell: too many steps, a target over a memory.
     """
     n = scene.fields[0].states
+    unknown = np.ones((len(regions), len(runs)), bool), np.ones(len(runs), bool)
     if scene.reset is not None or not runs or any(region.dim != n for region in regions):
-        return [True] * len(runs)
+        return unknown
     x = np.array([x0 for x0, _ in runs]).T
     inputs = np.zeros((scene.fields[0].variables, len(runs)))
     inputs[scene.fields[0].first_w : scene.fields[0].first_d] = np.array([w for _, w in runs]).T
@@ -180,7 +185,7 @@ def worth_following(
         while t < min(end, fld.end):
             J = at(slopes, t, x)[: n * n].T.reshape(-1, n, n)
             if not np.isfinite(J).all() or taken > MOST_FLOAT_STEPS:
-                return [True] * len(runs)
+                return unknown
             for k, region in enumerate(regions):
                 entered[k] |= region.point_gauges(x.T) <= 1.0
             before = ~entered.all(axis=0)
@@ -194,7 +199,7 @@ def worth_following(
             c = at(rates, t + 0.5 * h, x + 0.5 * h * b)
             x = x + h / 6.0 * (a + 2.0 * b + 2.0 * c + at(rates, t + h, x + h * c))
             t, taken = t + h, taken + 1
-    return [bool(v) for v in broken | ~entered.all(axis=0)]
+    return ~entered, broken
 
 
 @dataclass(frozen=True)

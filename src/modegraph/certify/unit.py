@@ -19,15 +19,16 @@ from ..reach.flow import Flow, Order
 from ..reach.tail import Tail, TailSearch
 from .approach import approach_of
 from .counterexample import (
+    FLOAT_STEPS,
     Equilibrium,
     PointRun,
     Scene,
     candidate_starts,
     enclose_equilibrium,
+    followed_in_floats,
     moved_inside,
     scene_of,
     trapped_in,
-    worth_following,
 )
 from .crossing import Nearest
 from .decision import Decision
@@ -251,13 +252,14 @@ class _Unit:
         starts = candidate_starts(scene, self._hints(found, left))[:4]
         runs = [(x0, w) for w in scene.disturbances() for x0 in starts]
         end = LONGEST_RUN if self.horizon is None else self.horizon
-        regions = [self.goals[k].region for k in left]
-        worth = worth_following(scene, runs, d, regions, end, safety=self.check is None)
-        for (x0, w), fine in zip(runs, worth, strict=True):
+        regions = {k: self.goals[k].region for k in left}
+        outside, broken = followed_in_floats(scene, runs, d, list(regions.values()), end, safety=self.check is None)
+        never = dict(zip(regions, outside, strict=True))
+        for r, (x0, w) in enumerate(runs):
             if (not left and self.check is not None) or time.monotonic() > self.deadline:
                 return
-            if fine:
-                left = self._try_run(PointRun(scene, x0, w, d), left)
+            if broken[r] or any(never[k][r] for k in left):
+                left = self._try_run(PointRun(scene, x0, w, d, longest_step=end / FLOAT_STEPS), left)
 
     def _hints(self, found: Findings, left: Sequence[int]) -> list[Floats]:
         """Worst starts met by the exploration, then extreme points of the start set."""
