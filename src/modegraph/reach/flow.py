@@ -28,11 +28,10 @@ from .passage import Passages
 from .pointwise import evaluate_over, workspace
 from .records import Failure, Order, Step
 from .start import Piece
-from .step_control import feeding_cap
+from .step_control import MOST_TIME_DEGREE, feeding_cap, time_degree
 
 Floats = NDArray[np.float64]
 
-TIME_DEGREE = 8
 JACOBIAN_TIME_DEGREE = 2
 FUNDAMENTAL_TIME_DEGREE = 5
 TOLERANCE = 1e-7
@@ -128,7 +127,9 @@ class Flow:
         self._unknowns = unknowns
         self._errors = error_table(self.table, self.q, n)
         self._spaces: dict[tuple[int, str], dict[str, Any]] = {}
-        self._cut = np.full(TIME_DEGREE + 1, order.degree, np.int64)
+        self._series: dict[str, Any] = {}
+        self.time_degree = MOST_TIME_DEGREE
+        self._cut = np.full(MOST_TIME_DEGREE + 1, order.degree, np.int64)
         if order.degree > 3:
             # The degree kept falls with the power of time: the dropped part is in the defect.
             fall = np.array([0, 0, 0, 1, 1, 2, 2, 2, 2])
@@ -251,8 +252,9 @@ class Flow:
             scale = TOLERANCE * (1.0 + np.abs(self._p[:, 0]).max())
             if status == DONE and np.isfinite(control).all():
                 rate, floor = control[0] / h, max(scale, 0.3 * control[1] / h)
-                factor = 1.6 if rate <= 0.0 else min(1.6, max(0.3, 0.9 * (floor / rate) ** (1.0 / TIME_DEGREE)))
+                factor = 1.6 if rate <= 0.0 else min(1.6, max(0.3, 0.9 * (floor / rate) ** (1.0 / self.time_degree)))
                 if rate > 4.0 * floor and h > 1e-4:
+                    self.time_degree = MOST_TIME_DEGREE
                     h_try = h * min(0.8, factor)
                     continue
                 caps = min(
@@ -267,6 +269,9 @@ class Flow:
                     h_try = h * caps
                     continue
                 factor = min(factor, caps, feeding_cap(self.piece, outcome))
+                degree = self.time_degree
+                if self.w_radius.any():
+                    degree = time_degree(degree, rate / floor, float(control[3]))
                 seen = self._observe(fld, h, tube)
                 look = shortened < SHORTER_LOOKS and h > 1e-6 and not (seen[0] <= 0.0).all()
                 # Between the ends a constraint is bounded through its bend: try a shorter look.
@@ -283,7 +288,7 @@ class Flow:
         else:
             self._fail(fld, NO_CONTRACTION, 0)
             return False
-        self.feedback = float(control[4])
+        self.feedback, self.time_degree = float(control[4]), degree
         self._ybox = rest
         self._record(t1, p, G, tube, bend, seen)
         if not np.isfinite(p).all() or self._runs_away():
@@ -298,7 +303,7 @@ class Flow:
         if self.segment not in self._passages:
             self._passages[self.segment] = Passages(self)
         passages = self._passages[self.segment]
-        ranges = self._spaces[(self.segment, "f")]["ranges"]
+        ranges = self._series["ranges"]
         return passages.attempt(self, h, stop) if passages.near(ranges) else None
 
     def _rate_cap(self, fld: Field) -> float:
@@ -323,8 +328,8 @@ class Flow:
 
     def _attempt(self, fld: Field, h: float) -> Any:
         f, j = fld.rates, fld.jacobian
-        K, KJ = TIME_DEGREE, JACOBIAN_TIME_DEGREE
-        big = self._space("f", f, K, self.table.size, self.order.degree)
+        K, KJ = self.time_degree, JACOBIAN_TIME_DEGREE
+        big = self._series = self._space(f"f{K}", f, K, self.table.size, self.order.degree)
         jac = self._space("j", j, KJ, self._errors.table.size, self._errors.table.order)
         inputs = np.zeros((fld.variables, self.table.size))
         inputs[: fld.states] = self._p
@@ -341,7 +346,7 @@ class Flow:
             f.ops, f.const, f.const_rad, f.outputs, f.variables,
             j.ops, j.const, j.const_rad, outputs, j.variables,
             n, inputs, self._G, moving, fld.full_w and len(moving) > 0, fld.first_w, fld.time_index,
-            h, K, self._cut, KJ, self.q, FUNDAMENTAL_TIME_DEGREE,
+            h, K, self._cut[: K + 1], KJ, self.q, FUNDAMENTAL_TIME_DEGREE,
             self.table.pairs, most, self._ebox, self._ybox,
             big["P"], big["dg"], big["norms"], big["R"], big["kinks"], big["ranges"],
             jac["P"], jac["dg"], jac["norms"], jac["R"], jac["kinks"], jac["ranges"],
@@ -385,7 +390,7 @@ class Flow:
         tops = self.seen_bounds.upper(np.concatenate([ends[:2, :faces], errors, -errors], axis=1)).max(axis=0)
         upper = tops[:faces] + slack[:faces, 0]
         if faces and not (upper <= 0.0).all():
-            fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, TIME_DEGREE)
+            fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, self.time_degree)
             fine = self.bounds.upper(fine_ends[:2, :faces]).max(axis=0) + fine_slack[:faces, 0]
             for i in np.flatnonzero(~(fine <= 0.0)):
                 if np.isfinite(fine_slack[i, 0]):
@@ -403,7 +408,7 @@ class Flow:
         o = fld.observed
         size = int(self.table.start[q + 1])
         space = self._space(f"o{q},{K}", o, K, size, q)
-        big = self._spaces[(self.segment, "f")]
+        big = self._series
         radius = np.zeros(fld.variables)
         radius[: fld.states] = tube
         radius[fld.first_w : fld.first_d] = self.w_radius

@@ -13,6 +13,9 @@ FEEDING = 0.05
 """Rate at which the remainder may feed itself, relative to the spectral radius of the Jacobian."""
 LONGER = 1.6
 """A step is at most this much longer than the one before."""
+MOST_TIME_DEGREE, LEAST_TIME_DEGREE = 8, 4
+ENOUGH, TOO_MUCH = 0.1, 0.3
+"""Shares of the time error in what is allowed, at which a lower and a higher degree in time are tried."""
 
 
 def feeding_cap(piece: Piece, outcome: Any) -> float:
@@ -30,3 +33,16 @@ def feeding_cap(piece: Piece, outcome: Any) -> float:
     feeding = float((rest / z).max()) * float(control[4])
     # What a step adds to the rate grows with the square of its length, or faster; the rest stays.
     return max(SLOW_RATE / float(control[3]), float((FEEDING * control[3] / feeding) ** 0.5))
+
+
+def time_degree(degree: int, share: float, hA: float) -> int:
+    """The degree of the next Taylor polynomial in time, where a disturbance keeps steps short.
+
+    share : time error of the last step, relative to what is allowed
+    hA : spectral radius of h A0; each degree less costs about (degree + 1) / hA of accuracy.
+    """
+    if share > TOO_MUCH:
+        return min(degree + 1, MOST_TIME_DEGREE)
+    if degree > LEAST_TIME_DEGREE and 4.0 * share * (degree + 1) < ENOUGH * hA:
+        return degree - 1
+    return degree
