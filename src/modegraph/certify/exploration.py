@@ -187,7 +187,9 @@ class Exploration:
         if done or time.monotonic() > self.deadline or self.parts >= MOST_PARTS:
             return found
         cut_short = bool(found.failure or found.unproved)
-        if cut_short and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
+        # A part whose remainder feeds itself is cut: smaller ones need no high degrees.
+        finer = cut_short and not (found.refused and piece.depth > 0)
+        if finer and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
             second = self.explore(piece, again, check_again, effort + 1, found.looked)
             return merge(found, [second], again, check_again)
         if piece.depth >= DEEPEST_CUT or piece.variables == 0:
@@ -198,9 +200,9 @@ class Exploration:
         # No halves: the piece is proved to hold no start, though only now that it is cut.
         pieces = piece.split(variable)
         children: list[Findings] = []
-        for part in in_parallel(
-            [partial(self.explore, child, again, check_again, effort, found.looked) for child in pieces]
-        ):
+        effort = 0 if found.refused else effort
+        tasks = [partial(self.explore, child, again, check_again, effort, found.looked) for child in pieces]
+        for part in in_parallel(tasks):
             children.append(part)
             lost = not part.empty and not better(part, found, again, check_again)
             if lost and piece.chart.sublevel is None and flow.astride is None:
@@ -230,7 +232,7 @@ class Exploration:
         found.looked = course.looked
         if course.parked and proved_instants(flow) == len(flow.steps):
             if self.common and flow.feedback > TOO_MUCH_FEEDBACK:
-                self.refused = True
+                self.refused = found.refused = True
                 found.failure = too_wide(filled(flow))
                 return found
             found.parked = [flow]

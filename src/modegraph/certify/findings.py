@@ -24,6 +24,8 @@ class Findings:
     unproved: Unproved | None = None
     broken: bool = False
     """A sampled start really breaks a constraint: smaller parts cannot help."""
+    refused: bool = False
+    """Its remainder fed itself too much to wait for a common restart."""
     empty: bool = False
     """The part is proved to hold no start: the others decide without it."""
     flow: Flow | None = None
