@@ -44,6 +44,5 @@ def flow_with(lengths: list[float]) -> Flow:
 def test_only_short_steps_throughout_are_a_runaway(short: int, runs_away: bool) -> None:
     lengths = [0.1] * 15 + [0.005] * short
     flow = flow_with(lengths)
-    G = np.full((1, 1, flow.small), 0.0)
-    G[0, 0, 0] = 0.01 * 1.25 ** len(lengths)
-    assert bool(flow._runs_away(G)) == runs_away
+    flow.remainder = np.array([0.01 * 1.25 ** len(lengths)])
+    assert flow._runs_away() == runs_away

@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 POINT_ORDER = Order(1, 0)
 FLOAT_STEPS, MOST_FLOAT_STEPS = 200, 1500
 """Steps of a trajectory in floats, at least, and at most."""
+TOUCHING = 1e-6
+"""A trajectory that comes so near to a target, or to the bound of a constraint, in floats may be on either side."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,7 @@ class PointRun:
         return Witness(self.x0, w, dict(zip(names, self.d.tolist(), strict=True)), time, kind, r_i, r_j)  # type: ignore[arg-type]
 
 
+@np.errstate(all="ignore")
 def followed_in_floats(
     scene: Scene, runs: Sequence[tuple[Floats, Floats]], d: Floats, regions: Sequence[Region], end: float, safety: bool
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -187,10 +190,10 @@ def followed_in_floats(
             if not np.isfinite(J).all() or taken > MOST_FLOAT_STEPS:
                 return unknown
             for k, region in enumerate(regions):
-                entered[k] |= region.point_gauges(x.T) <= 1.0
+                entered[k] |= region.point_gauges(x.T) < 1.0 - TOUCHING
             before = ~entered.all(axis=0)
             faces = at(observed, t, x)[: len(fld.faces)]
-            broken |= (faces > -1e-6).any(axis=0) & (before | safety)
+            broken |= (faces > -TOUCHING).any(axis=0) & (before | safety)
             if not before.any() and not safety:
                 break
             h = min(end - t, fld.end - t, end / FLOAT_STEPS, 1.0 / max(1e-9, np.abs(J).sum(axis=2).max()))

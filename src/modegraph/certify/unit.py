@@ -318,7 +318,7 @@ class _Unit:
                     last, run.flow.piece.chart, run.w, np.zeros(len(run.w)), self.compiled.loop.names, order
                 )
                 outcome = search.attempt([run.flow])
-                if isinstance(outcome, Tail):
+                if isinstance(outcome, Tail) and any(self._outside(self.goals[k].region, outcome) for k in left):
                     tail = outcome
                     break
         return self._judge(run, tail, left)

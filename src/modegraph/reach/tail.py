@@ -29,7 +29,8 @@ FLOOR = 0.3
 """Least semi-axis of B relative to the largest, so that its aspect ratio is harmless."""
 
 TOO_MUCH_FEEDBACK = 0.6
-"""A candidate set whose remainder feeds itself by this share is given up: soon it grows without bound."""
+"""A candidate set whose remainder feeds itself by this share is given up where a disturbance acts: soon the
+remainder grows without bound. (That of a class of references may do so for long.)"""
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,7 @@ class TailSearch:
                 return TailFailure(f"constraint '{bad}' cannot be proved on the candidate set")
             if self._inside(flow, axes, centre):
                 return self._tail(flow, start, decay)
-            if flow.feedback > TOO_MUCH_FEEDBACK:
+            if self.w_radius.any() and not self._tilt.any() and flow.feedback > TOO_MUCH_FEEDBACK:
                 return TailFailure("the disturbance fills the candidate set before it returns")
         return TailFailure("the candidate set does not return into itself")
 
