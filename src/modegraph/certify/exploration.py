@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Lock
 
@@ -41,8 +41,8 @@ DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 TOO_MUCH_FEEDBACK = 0.5
-NEXT_LOOK = 2.0
-"""Around a part an invariant set is looked for this many times later than around the whole, where that was in vain."""
+FAR = 2.0
+"""A flow that waits or is given up is not compared with targets it was never nearer to than this, at any look."""
 WORTH_A_TAIL = 0.7
 """An invariant set is looked for again when the reach set is smaller by this factor."""
 STALLED = 0.98
@@ -60,13 +60,13 @@ class Course:
     """How far a chain of flows was followed.
 
     ``tail``, or the ``reason`` there is none; whether the (first) flow wants to be restarted (``parked``);
-    when an invariant set around it was first looked for in vain (``looked``, seconds).
+    the least gauge of each target at the looks, and when that was (``nearest``).
     """
 
     tail: Tail | Sinking | None = None
     reason: str = ""
     parked: bool = False
-    looked: float = 0.0
+    nearest: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -173,12 +173,10 @@ class Exploration:
             part.parked = [*before, *flows]
         return part
 
-    def explore(
-        self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0, looked: float = 0.0
-    ) -> Findings:
+    def explore(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0) -> Findings:
         """Decide the wanted goals (and the check) on one part, cutting it where that helps."""
         self.parts += 1
-        found = self._run(piece, wanted, safety, effort, looked)
+        found = self._run(piece, wanted, safety, effort)
         if found.parked and not self.common:
             self.try_alone(found)
         left = [j for j in wanted if j not in found.proofs and j not in found.waiting]
@@ -190,7 +188,7 @@ class Exploration:
         # A part whose remainder feeds itself is cut: smaller ones need no high degrees.
         finer = cut_short and not (found.refused and piece.depth > 0)
         if finer and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
-            second = self.explore(piece, again, check_again, effort + 1, found.looked)
+            second = self.explore(piece, again, check_again, effort + 1)
             return merge(found, [second], again, check_again)
         if piece.depth >= DEEPEST_CUT or piece.variables == 0:
             return found
@@ -201,7 +199,7 @@ class Exploration:
         pieces = piece.split(variable)
         children: list[Findings] = []
         effort = 0 if found.refused else effort
-        tasks = [partial(self.explore, child, again, check_again, effort, found.looked) for child in pieces]
+        tasks = [partial(self.explore, child, again, check_again, effort) for child in pieces]
         for part in in_parallel(tasks):
             children.append(part)
             lost = not part.empty and not better(part, found, again, check_again)
@@ -221,15 +219,14 @@ class Exploration:
             hopeful |= set(left)
         return sorted(hopeful), safety and found.safety is None and cut_short
 
-    def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int, looked: float) -> Findings:
+    def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int) -> Findings:
         order = self.order(piece, effort)
         flow = Flow(
             self.fields, piece, self.w_centre, self.w_radius, order,
             names=self.names, reset=self.reset, stops=self.stops, longest_step=self._longest_step(),
         )  # fmt: skip
-        course = self._advance([flow], wanted, safety, self.end(), park=True, looked=looked)
+        course = self._advance([flow], wanted, safety, self.end(), park=True)
         found = self._findings([flow], wanted, course, safety)
-        found.looked = course.looked
         if course.parked and proved_instants(flow) == len(flow.steps):
             if self.common and flow.feedback > TOO_MUCH_FEEDBACK:
                 self.refused = found.refused = True
@@ -245,17 +242,13 @@ class Exploration:
         """Instant at which a flow is given up, seconds."""
         return min(self.until, LONGEST if self.horizon is None else self.horizon)
 
-    def _advance(
-        self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool, looked: float = 0.0
-    ) -> Course:
+    def _advance(self, flows: list[Flow], wanted: Sequence[int], safety: bool, end: float, park: bool) -> Course:
         """Extend a chain of flows until everything is decided or nothing more can be expected.
 
         With ``park`` it stops where the (first) flow wants to be restarted, else it restarts and goes on.
-        ``looked``: when an invariant set was first looked for in vain around a larger part of the starts.
         """
         flow = flows[-1]
-        start = self.fields[-1].start
-        course = Course(looked=looked)
+        course = Course()
         decay = np.inf
         previous = dict.fromkeys(wanted, np.inf)
         pending = list(wanted)
@@ -288,6 +281,7 @@ class Exploration:
             checkpoint = int(taken * 1.25) + 4
             self.tick(f"t = {flow.time:.3g} s")
             now = {j: self._gauge_now(flow, j) for j in pending}
+            course.nearest |= {j: min(course.nearest.get(j, (np.inf, 0.0)), (now[j], flow.time)) for j in pending}
             pending = [j for j in pending if not now[j] <= 1.0]
             stalled = all(now[j] > STALLED * previous[j] for j in pending)
             idle = idle + 1 if stalled else 0
@@ -295,7 +289,7 @@ class Exploration:
             patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 2
             passing = park and pending and disturbed and idle < patience
             size = set_size(flow)
-            due = flow.time >= start and (not pending or flow.time >= NEXT_LOOK * looked)
+            due = flow.time >= self._rest(flow, bool(pending) and disturbed)
             if course.tail is None and due and not passing and size < WORTH_A_TAIL * tried:
                 search = TailSearch(
                     flow.fields[-1], flow.piece.chart, self.w_centre, self.w_radius, self.names, self._tail_order()
@@ -304,8 +298,6 @@ class Exploration:
                 if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
                     course.tail, decay = outcome, outcome.decay
                 else:
-                    if np.isinf(tried):
-                        course.looked = flow.time
                     course.reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
                     sunk = self._sink(flow, pending) if not pending else None
                     if isinstance(sunk, Sinking):
@@ -338,6 +330,14 @@ class Exploration:
                 flow = following
             previous = {j: now[j] for j in pending}
         return course
+
+    def _rest(self, flow: Flow, settling: bool) -> float:
+        """From when an invariant set is looked for, seconds: ``settling``, not before the slowest mode has had time."""
+        start = self.fields[-1].start
+        if not settling or flow.time < start:
+            return start
+        slowest = -float(np.linalg.eigvals(flow.slope).real.max())
+        return start + 1.0 / slowest if slowest > 0.0 else start
 
     def again(self, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
         """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
@@ -407,6 +407,10 @@ class Exploration:
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)
         found.safe_until = float(short.times[proved]) if proved >= 0 else float(short.times[0])
         for j in wanted:
+            gauge, when = course.nearest.get(j, (0.0, 0.0))
+            if course.parked and gauge > FAR:
+                found.missed[j] = Missed(gauge, when, True, flow.piece.middle)
+                continue
             outcome = self._crossing(flows, j, tail if isinstance(tail, Sinking) else None, before)
             if isinstance(outcome, Missed):
                 found.missed[j] = outcome

@@ -30,8 +30,6 @@ class Findings:
     """The part is proved to hold no start: the others decide without it."""
     flow: Flow | None = None
     last: Flow | None = None
-    looked: float = 0.0
-    """When an invariant set was first looked for in vain, seconds."""
     parked: list[Flow] = field(default_factory=list)
     """Flows that wait for a common restart, because the disturbance has filled them."""
     waiting: dict[int, list[SwitchProof]] = field(default_factory=dict)
