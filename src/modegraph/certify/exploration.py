@@ -20,7 +20,7 @@ from ..reach.field import Field
 from ..reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
 from ..reach.funnel import NoFunnel
 from ..reach.parallelotope import mode_gap
-from ..reach.restart import WIDE_GAP, mostly_remainder, restarted
+from ..reach.restart import WIDE_GAP, filled_share, restarted
 from ..reach.start import Piece
 from ..reach.tail import Tail, TailSearch
 from .crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
@@ -38,9 +38,11 @@ MOST_MONOMIALS = 1300
 MOST_GENERATOR_MONOMIALS = 100
 MOST_PARTS = 48
 DEEPEST_CUT = 7
-SETTLING = 4.0
+SETTLING = 3.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 TOO_MUCH_FEEDBACK = 0.5
+MUCH_TOO_LARGE = 0.05
+"""A part whose remainder feeds itself while it is this small, relative to the polynomial part, is quartered."""
 FAR = 2.0
 """A flow that waits or is given up is not compared with targets it was never nearer to than this, at any look."""
 WORTH_A_TAIL = 0.7
@@ -197,12 +199,15 @@ class Exploration:
         variable = nonlinear_variable(flow) if cut_short else widest_variable(flow.bounds, flow.set_at(0)[0])
         # No halves: the piece is proved to hold no start, though only now that it is cut.
         pieces = piece.split(variable)
+        if found.refused and filled_share(flow) < MUCH_TOO_LARGE and piece.depth + 1 < DEEPEST_CUT:
+            second = nonlinear_variable(flow, cut=variable)
+            pieces = [part for half in pieces for part in half.split(second)]
         children: list[Findings] = []
         effort = 0 if found.refused else effort
         tasks = [partial(self.explore, child, again, check_again, effort) for child in pieces]
-        for part in in_parallel(tasks):
-            children.append(part)
-            lost = not part.empty and not better(part, found, again, check_again)
+        for child in in_parallel(tasks):
+            children.append(child)
+            lost = not child.empty and not better(child, found, again, check_again)
             if lost and piece.chart.sublevel is None and flow.astride is None:
                 # Smaller starts get no further: the disturbance, not the size of the start, is in the way.
                 # At a kink a cut leaves a part astride of it, which may get no further yet.
@@ -348,7 +353,7 @@ class Exploration:
         """
         flow = last[0]
         framed = not first or mode_gap(flow.slope) > WIDE_GAP
-        compact = self.common and (flow.generation == 0 or mostly_remainder(flow))
+        compact = self.common and (flow.generation == 0 or filled_share(flow) > 1.0)
         following = restarted(last, self.framed if framed else self.fields, compact=compact)
         started = following is not None and following.time < end and following.advance(end)
         if following is not None and started and proved_instants(following) == len(following.steps):

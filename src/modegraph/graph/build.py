@@ -171,11 +171,13 @@ def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]
 
 
 def _size(unit: _Unit) -> tuple[bool, float]:
-    """Classes, then wide starts, take longest: begun first, they keep all cores busy to the end."""
+    """Classes, then wide starts, take longest, and small ones where the reference moves: begun first, they keep all
+    cores busy to the end."""
     if _is_class(unit.mode):
         return True, 0.0
     lo, hi = mode_start(unit.mode, unit.parameter).bounding_box()
-    return False, float(np.log(np.asarray(hi) - np.asarray(lo) + SMALL).sum())
+    size = float(np.log(np.asarray(hi) - np.asarray(lo) + SMALL).sum())
+    return False, 0.5 * size if unit.mode.reference.duration > 0.0 else size
 
 
 def _is_class(mode: Mode | Target) -> bool:

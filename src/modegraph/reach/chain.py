@@ -117,9 +117,12 @@ class Chain:
         return steps[-1].end if steps else 0.0
 
 
-def nonlinear_variable(flow: Flow) -> int:
+def nonlinear_variable(flow: Flow, cut: int | None = None) -> int:
     """The variable to cut: with the largest share in a kink the starts are astride of, else in the nonlinear
-    terms early in the flow, else in the width. Among equals the one that was cut least."""
+    terms early in the flow, else in the width. Among equals the one that was cut least.
+
+    ``cut``: a variable that is cut already; squares of its halves are a quarter.
+    """
     p, _ = flow.set_at(max(1, len(flow.steps) // 3) if flow.steps else 0)
     exponents = flow.bounds.exponents
     weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
@@ -130,5 +133,7 @@ def nonlinear_variable(flow: Flow) -> int:
         for row, used in enumerate((reads & higher, reads)):
             share[row, v] = float((np.abs(p[:, used]) * exponents[used, v]).sum(axis=1) @ weight)
     chosen = flow.astride if flow.astride is not None else share[0] if share[0].any() else share[1]
+    if cut is not None:
+        chosen = np.where(np.arange(len(chosen)) == cut, 0.25 * chosen, chosen)
     largest = chosen >= (1.0 - EQUAL) * chosen.max()
     return int(np.argmax(np.where(largest, flow.piece.radius, -1.0)))

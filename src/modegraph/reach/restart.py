@@ -58,10 +58,13 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool =
     )
 
 
-def mostly_remainder(flow: Flow) -> bool:
-    """Whether the remainder is larger than the polynomial part in every state: then that is not worth variables."""
+def filled_share(flow: Flow) -> float:
+    """How large the remainder is relative to the polynomial part, in the state where it is least.
+
+    Above 1 the polynomial part is not worth variables of its own.
+    """
     p, G = flow.state_set(len(flow.steps))
-    return bool((generator_box(G) > np.abs(p[:, 1:]).sum(axis=1)).all())
+    return float((generator_box(G) / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)).min())
 
 
 def halved(flow: Flow, variable: int) -> list[Flow]:
