@@ -13,7 +13,7 @@ import modegraph as mg
 from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.flow import Flow, Order, generator_box
-from modegraph.reach.restart import restarted
+from modegraph.reach.restart import filled_share, restarted
 from modegraph.reach.substitution import Substitution
 from tests.soundness.families import pushed, references, runs
 
@@ -180,3 +180,13 @@ def test_runs_of_a_class_stay_inside_after_restarts() -> None:
         lo, hi = ends_at(flow, p)
         assert (lo[:, None] - 1e-10 <= x).all()
         assert (x <= hi[:, None] + 1e-10).all()
+
+
+def test_how_much_of_a_set_is_remainder(compiled: CompiledMode) -> None:
+    flow = flow_of(compiled, compiled.whole(), 1)
+    n = len(flow.p0)
+    flow.steps[0].p = np.zeros_like(flow.steps[0].p)
+    flow.steps[0].p[:, 1] = 2.0
+    flow.steps[0].G = np.zeros((n, n, 1))
+    flow.steps[0].G[np.arange(n), np.arange(n), 0] = 1.0 + np.arange(n)
+    assert filled_share(flow) == pytest.approx(0.5)

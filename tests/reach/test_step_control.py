@@ -6,7 +6,14 @@ import numpy as np
 
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.start import Chart, Piece
-from modegraph.reach.step_control import LONGER, SLOW_RATE, feeding_cap
+from modegraph.reach.step_control import (
+    LEAST_TIME_DEGREE,
+    LONGER,
+    MOST_TIME_DEGREE,
+    SLOW_RATE,
+    feeding_cap,
+    time_degree,
+)
 from tests.soundness.families import pendulum
 
 
@@ -28,3 +35,16 @@ def test_one_reference_keeps_its_steps() -> None:
     nothing = np.zeros(0)
     alone = Piece.whole(Chart(np.zeros(2), np.eye(2), False, None, nothing, nothing))
     assert feeding_cap(alone, outcome(1e-3, 1.0)) == LONGER
+
+
+def test_the_degree_in_time_falls_only_where_a_lower_one_is_still_accurate() -> None:
+    """One degree less costs about (degree + 1) / hA: 8 to 7 at hA = 0.3 some thirty times."""
+    assert time_degree(8, 1e-4, 0.3) == 7
+    assert time_degree(8, 1e-2, 0.3) == 8
+    assert time_degree(8, 1e-4, 0.01) == 8
+    assert time_degree(LEAST_TIME_DEGREE, 0.0, 0.3) == LEAST_TIME_DEGREE
+
+
+def test_the_degree_in_time_rises_where_the_error_is_seen() -> None:
+    assert time_degree(5, 0.5, 0.3) == 6
+    assert time_degree(MOST_TIME_DEGREE, 0.5, 0.3) == MOST_TIME_DEGREE

@@ -200,8 +200,8 @@ class Exploration:
         # No halves: the piece is proved to hold no start, though only now that it is cut.
         pieces = piece.split(variable)
         if found.refused and filled_share(flow) < MUCH_TOO_LARGE and piece.depth + 1 < DEEPEST_CUT:
-            second = nonlinear_variable(flow, cut=variable)
-            pieces = [part for half in pieces for part in half.split(second)]
+            across = nonlinear_variable(flow, cut=variable)
+            pieces = [part for half in pieces for part in half.split(across)]
         children: list[Findings] = []
         effort = 0 if found.refused else effort
         tasks = [partial(self.explore, child, again, check_again, effort) for child in pieces]
@@ -292,7 +292,7 @@ class Exploration:
             idle = idle + 1 if stalled else 0
             # Enclosed again, a flow would go on without what was found.
             patience = IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 2
-            passing = park and pending and disturbed and idle < patience
+            passing = park and pending and disturbed and idle < patience and flow.time < end
             size = set_size(flow)
             due = flow.time >= self._rest(flow, bool(pending) and disturbed)
             if course.tail is None and due and not passing and size < WORTH_A_TAIL * tried:

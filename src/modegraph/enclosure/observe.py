@@ -7,14 +7,14 @@ from numba import njit
 
 from .adjoint import tighten
 from .jets import solve_in_time
-from .polynomial import KERNEL
+from .polynomial import SHORT
 from .remainder import coefficient_norms, remainders, wants_another_try
 from .rounding import TINY, UNIT, UP
 from .step import truncate_inputs
 from .variational import chord_distance
 
 
-@njit(**KERNEL)
+@njit(**SHORT)
 def observe_step(
     fP, fdg, fnorms, fvariables, ops, const, const_rad, outputs, variables, radius, h, KQ, cut, pairs,
     Q, dq, nQ, RQ, kinks, ranges, product, offset, start, degree,
@@ -78,7 +78,7 @@ def observe_step(
     return ends, slack
 
 
-@njit(**KERNEL)
+@njit(**SHORT)
 def enclose_at(
     ops, const, const_rad, outputs, variables, p, radius, cut, pairs,
     Q, dq, nQ, RQ, kinks, ranges, product, offset, start, degree,

@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 
 KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy"}
+SHORT = {**KERNEL, "nogil": False}
+"""For kernels of less than a tenth of a millisecond: giving the interpreter lock away costs more than it gains."""
 
 
 @njit(inline="always", **KERNEL)
@@ -64,7 +66,7 @@ def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
     return dc
 
 
-@njit(**KERNEL)
+@njit(**SHORT)
 def absolute_sums(G):
     """Sums (n,) of |G[g, i, k]| over g and k."""
     out = np.zeros(G.shape[1])

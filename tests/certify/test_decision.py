@@ -1,0 +1,83 @@
+"""Parts that a disturbance has filled: from one enclosure of all their ends, or alone where that shows nothing."""
+
+from __future__ import annotations
+
+import runpy
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import modegraph as mg
+from modegraph.certify.exploration import Exploration
+from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
+from modegraph.reach.flow import Flow
+
+ARM = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "two_link_arm.py"))
+ANGLE, RATE = 0.2, 0.4
+
+
+def decided() -> UnitResult:
+    """The arm held at B from so wide a start set that parts of it wait for each other, towards q7."""
+    at = np.array(ARM["B"])
+    source = ARM["mode"]("q6", ARM["wide"], mg.setpoint(at), ANGLE, RATE)
+    target = next(m for m in ARM["modes"] if m.name == "q7")
+    return certify_unit(
+        source, at, [TargetSpec("q7", at, target)], horizon=10.0, deadline=time.monotonic() + 120.0, progress=None
+    )
+
+
+def watched(monkeypatch: pytest.MonkeyPatch, together: bool) -> list[int]:
+    """Numbers of flows that were enclosed at once; without ``together`` no two ever are."""
+    real, seen = Exploration.again, []
+
+    def again(self: Exploration, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
+        seen.append(len(last))
+        return real(self, last, end, first) if together or len(last) == 1 else None
+
+    monkeypatch.setattr(Exploration, "again", again)
+    return seen
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_what_waits_is_decided_together_or_alone(monkeypatch: pytest.MonkeyPatch, together: bool) -> None:
+    seen = watched(monkeypatch, together)
+    found = decided()
+    assert seen[0] > 1
+    assert (len(seen) <= 3) == together
+    (verdict,) = found.verdicts
+    assert verdict.status is mg.Status.CERTIFIED
+    assert found.check.status is mg.Status.CERTIFIED
+    assert verdict.time is not None
+    # Sampled, the last start enters after 1.6 s.
+    assert 1.6 < verdict.time[1] < 5.0
+
+
+def test_a_common_flow_begins_at_the_latest_of_the_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    real: Any = Exploration.again
+    instants: list[tuple[float, float, float]] = []
+
+    def again(self: Exploration, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
+        following: Flow | None = real(self, last, end, first)
+        if len(last) > 1 and following is not None:
+            times = [flow.time for flow in last]
+            instants.append((min(times), max(times), float(following.times[0])))
+            for flow in last:
+                p, G = flow.state_set(len(flow.steps))
+                lo, hi = flow.bounds.ranges(p)
+                z = np.abs(G).sum(axis=(0, 2))
+                q, H = following.state_set(0)
+                below, above = following.bounds.ranges(q)
+                y = np.abs(H).sum(axis=(0, 2))
+                assert (below - y <= lo - z + 1e-9).all()
+                assert (hi + z - 1e-9 <= above + y).all()
+        return following
+
+    monkeypatch.setattr(Exploration, "again", again)
+    decided()
+    assert instants
+    for first, latest, begin in instants:
+        assert first < latest == begin
