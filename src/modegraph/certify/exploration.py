@@ -38,7 +38,7 @@ MOST_MONOMIALS = 1300
 MOST_GENERATOR_MONOMIALS = 100
 MOST_PARTS = 48
 DEEPEST_CUT = 7
-SETTLING = 3.0
+SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 TOO_MUCH_FEEDBACK = 0.5
 MUCH_TOO_LARGE = 0.05
