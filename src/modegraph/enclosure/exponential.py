@@ -39,11 +39,15 @@ def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, de
             Y[r, c] = s * h * UP
             row += Y[r, c]
         norm = max(norm, row * UP)
-    images[0] = vector
+    for i in range(n):
+        for l in range(Nq):
+            images[0, i, l] = vector[i, l]
     for k in range(POWERS + 1):
         if k > 0:
-            images[k], lost = apply_matrix(J, dJ, images[k - 1], n, q, h, product, offset, start, degree)
+            image, lost = apply_matrix(J, dJ, images[k - 1], n, q, h, product, offset, start, degree)
             for i in range(n):
+                for l in range(Nq):
+                    images[k, i, l] = image[i, l]
                 s = lost[i] + TINY
                 for c in range(n):
                     s += Y[i, c] * (missed[k - 1, c] + gamma * sizes[k - 1, c])
@@ -58,15 +62,19 @@ def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, de
     power = (sizes[POWERS] + missed[POWERS]).reshape(n, 1)
     for k in range(1, POWERS + 1):
         power = power * (UP / k)
-    largest = power.max()
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, power[i, 0])
     negligible = NEGLIGIBLE * largest
     beyond = np.zeros(n)
     k = POWERS
     while k < MOST_POWERS and (k < POWERS + 6 or 2.0 * norm > k + 2.0 or largest > negligible):
         k += 1
         power = matrix_product(Y, power) * (UP / k)
-        beyond += power[:, 0] * UP
-        largest = power.max()
+        largest = 0.0
+        for i in range(n):
+            beyond[i] += power[i, 0] * UP
+            largest = max(largest, power[i, 0])
     # sum over m >= 1 of norm^m / ((k + 1) ... (k + m)).
     rest = norm / (k + 1.0) * (2.0 if 2.0 * norm <= k + 2.0 else np.exp(norm)) * UP
     for i in range(n):

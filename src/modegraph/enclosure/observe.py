@@ -29,7 +29,9 @@ def observe_step(
     q = cut[0]
     Nq = Q.shape[2]
     lost = np.zeros(variables.size)
-    embed = np.arange(Nq)
+    embed = np.zeros(Nq, np.int64)
+    for k in range(Nq):
+        embed[k] = k
     truncate_inputs(fP, fdg, fnorms, fvariables, Q, dq, variables, KQ, q, embed, start, lost)
     for v in range(variables.size):
         RQ[variables[v]] = (lost[v] + radius[v]) * UP
@@ -119,6 +121,7 @@ def enclose_at(
     out = np.zeros((count, p.shape[1]))
     size = np.zeros(count)
     for i in range(count):
-        out[i] = Q[outputs[i], 0]
+        for k in range(p.shape[1]):
+            out[i, k] = Q[outputs[i], 0, k]
         size[i] = RQ[outputs[i]]
     return out, size, bad

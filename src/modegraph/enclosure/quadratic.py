@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL
+from .polynomial import KERNEL, ascending
 from .rounding import TINY, UNIT, UP
 
 MAIN_GENERATORS = 40
@@ -24,8 +24,10 @@ def quadratic_bound(H, G0, G1, spread):
     count = G0.shape[0] + n
     a0 = np.zeros((count, n))
     a1 = np.zeros((count, n))
-    a0[: count - n] = G0
-    a1[: count - n] = G1
+    for a in range(count - n):
+        for v in range(n):
+            a0[a, v] = G0[a, v]
+            a1[a, v] = G1[a, v]
     for v in range(n):
         a0[count - n + v, v] = spread[v]
         a1[count - n + v, v] = spread[v]
@@ -79,7 +81,7 @@ def main_generators(G0, G1, most, spread):
     for a in range(count):
         for i in range(n):
             size[a] -= abs(G0[a, i, 0]) / (scale[i] + TINY)
-    ranked = np.argsort(size)
+    ranked = ascending(size)
     kept = min(most, count)
     out0 = np.zeros((kept, n))
     out1 = np.zeros((kept, n))

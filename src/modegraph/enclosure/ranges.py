@@ -89,7 +89,7 @@ def upper_bound(c, exponents, lo, hi, limit, cells):
     Stops as soon as the bound is at most ``limit``, or cannot become so.
     """
     m = exponents.shape[1]
-    top = 0
+    top = np.int64(0)
     for k in range(exponents.shape[0]):
         for v in range(m):
             top = max(top, exponents[k, v])
@@ -101,9 +101,11 @@ def upper_bound(c, exponents, lo, hi, limit, cells):
     H = np.zeros((cells + 2, m))
     bound = np.zeros(cells + 2)
     split = np.zeros(cells + 2, np.int64)
-    L[0] = lo
-    H[0] = hi
-    bound[0], split[0] = _cell_bound(c, exponents, top, lo, hi, low_power, high_power, g_lo, g_hi)
+    # Entry by entry: assigning whole rows takes a second to compile.
+    for v in range(m):
+        L[0, v] = lo[v]
+        H[0, v] = hi[v]
+    bound[0], split[0] = _cell_bound(c, exponents, top, L[0], H[0], low_power, high_power, g_lo, g_hi)
     count = 1
     for _ in range(cells):
         worst = 0
@@ -112,10 +114,11 @@ def upper_bound(c, exponents, lo, hi, limit, cells):
                 worst = i
         if bound[worst] <= limit or m == 0:
             break
+        for u in range(m):
+            L[count, u] = L[worst, u]
+            H[count, u] = H[worst, u]
         v = split[worst]
         middle = 0.5 * (L[worst, v] + H[worst, v])
-        L[count] = L[worst]
-        H[count] = H[worst]
         L[count, v] = middle
         H[worst, v] = middle
         bound[count], split[count] = _cell_bound(

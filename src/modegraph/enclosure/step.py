@@ -420,14 +420,24 @@ def flow_step(
     carried = chords.shape[0]
     fresh = 2 * carried + 3 * nw
     grown = np.zeros((old + n + fresh, n, Nq))
-    grown[:old] = H_end
+    for g_old in range(old):
+        for i in range(n):
+            for k in range(Nq):
+                grown[g_old, i, k] = H_end[g_old, i, k]
     for i in range(n):
         grown[old + i, i, 0] = (box[i] + dropped[i]) * UP + TINY
     for i in range(carried):
-        grown[old + n + 2 * i : old + n + 2 * i + 2] = c_total[i] * chords[i]
+        for side in range(2):
+            row = old + n + 2 * i + side
+            for r in range(n):
+                for k in range(Nq):
+                    grown[row, r, k] = c_total[i] * chords[i, side, r, k]
     for j in range(nw):
-        row = old + n + 2 * carried + 3 * j
-        grown[row : row + 3] = columns[j]
+        for c in range(3):
+            row = old + n + 2 * carried + 3 * j + c
+            for r in range(n):
+                for k in range(Nq):
+                    grown[row, r, k] = columns[j, c, r, k]
     if grown.shape[0] > most:
         grown = reduce_generators(grown, most - 2 * n - fresh)
     time_error = 0.0

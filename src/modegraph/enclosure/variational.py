@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL, multiply_into
+from .polynomial import KERNEL, ascending, multiply_into
 from .rounding import TINY, UNIT, UP
 
 
@@ -379,7 +379,7 @@ def reduce_generators(G, keep):
     grow = np.ones(count)
     rest = np.zeros(n)
     left = count
-    for b in np.argsort(cost):
+    for b in ascending(cost):
         if left <= keep:
             break
         a = partner[b]

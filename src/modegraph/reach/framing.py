@@ -32,7 +32,7 @@ def out_of_frame(frame: Frame, p: Floats, G: Floats) -> tuple[Floats, Floats]:
 def generator_box(G: Floats) -> Floats:
     """Radii (n,) of a box around sum_g G_g(xi) zeta_g, rounded up."""
     count = G.shape[0] * G.shape[2]
-    return np.asarray(absolute_sums(G) * (1.0 + (count + 4) * UNIT * 2.0))
+    return np.asarray(absolute_sums(np.ascontiguousarray(G)) * (1.0 + (count + 4) * UNIT * 2.0))
 
 
 def thinned(G: Floats, kept: int) -> Floats:
