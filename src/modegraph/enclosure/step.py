@@ -201,7 +201,8 @@ def flow_step(
         for i in range(n):
             for k in range(Nq):
                 z[i] += abs(G[row, i, k])
-    z = z * UP
+    for i in range(n):
+        z[i] *= UP
     lost = np.zeros(variables.size)
     J = np.zeros((n * n, KJ + 1, Nq))
     dJ = np.zeros((n * n, KJ + 1), np.int64)
@@ -214,8 +215,12 @@ def flow_step(
     hess = np.zeros((n, n, n))
     H_end = G
     dropped = nothing
-    ybox = np.maximum(1.3 * ybox0, 3.0 * defect) + TINY
-    ebox = np.maximum(1.2 * ebox0, 1.2 * (z + 2.0 * defect)) + TINY
+    # Entry by entry: every expression with whole arrays takes a quarter of a second to compile.
+    ybox = np.zeros(n)
+    ebox = np.zeros(n)
+    for i in range(n):
+        ybox[i] = max(1.3 * ybox0[i], 3.0 * defect[i]) + TINY
+        ebox[i] = max(1.2 * ebox0[i], 1.2 * (z[i] + 2.0 * defect[i])) + TINY
     need = ebox
     g = nothing
     u = nothing
@@ -361,7 +366,9 @@ def flow_step(
             ok_plain, g_plain = growth_bound(h, M, again)
             ok_exp, g_exp = growth_bound(h, WD, W_again)
             if ok_plain and ok_exp:
-                rest = np.minimum(g_plain, g_exp)
+                rest = g_plain
+                for i in range(n):
+                    rest[i] = min(g_plain[i], g_exp[i])
             elif ok_plain:
                 rest = g_plain
             elif ok_exp:
@@ -390,8 +397,9 @@ def flow_step(
                 ybox = g
         if accepted:
             break
-        ebox = np.maximum(ebox, 1.3 * need)
-        ybox = np.maximum(ybox, 1.5 * g)
+        for i in range(n):
+            ebox[i] = max(ebox[i], 1.3 * need[i])
+            ybox[i] = max(ybox[i], 1.5 * g[i])
     if not accepted:
         return NO_CONTRACTION, 0, nothing_p, G, ebox, nothing, defect, control
     # p(1): K + 1 terms summed, at most K roundings.
