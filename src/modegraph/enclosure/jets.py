@@ -129,7 +129,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
         if j == 0:
             da = min(dg[a, 0], dmax)
             c[0] = 1.0 / P[a, 0, 0]
-            d = np.int64(0)
+            d = max(d, 0)
             right = 1
             while right < dmax + 1 and da > 0:
                 right *= 2
