@@ -397,4 +397,18 @@ ENGINE_FAULTS = (
         "rounded = 1e-3 * ROUNDED * np.maximum(np.abs(low), np.abs(high))[:, 0]",
         ("tests/reach/test_class_chart.py::test_numbers_that_are_largest_inside_the_class_count",),
     ),
+    Fault(
+        "parts that go on together begin at the first of their ends",
+        "reach/restart.py",
+        "        t0=max(flow.time for flow in flows),",
+        "        t0=min(flow.time for flow in flows),",
+        ("tests/certify/test_decision.py::test_a_common_flow_begins_at_the_latest_of_the_ends",),
+    ),
+    Fault(
+        "a reduced polynomial in time leaves out its own error",
+        "enclosure/step.py",
+        "        defect[i] = (s + in_time[i] + h * R[o]) * UP + TINY",
+        "        defect[i] = (s + h * R[o]) * UP + TINY",
+        ("tests/enclosure/test_remainder_of_a_step.py", "tests/reach/test_flow.py"),
+    ),
 )

@@ -232,8 +232,8 @@ KERNEL_FAULTS = (
     Fault(
         "pushes in a step leave nothing at its end",
         "enclosure/step.py",
-        "grown[old + n + 2 * i : old + n + 2 * i + 2] = c_total[i] * chords[i]",
-        "grown[old + n + 2 * i : old + n + 2 * i + 2] = 0.0 * chords[i]",
+        "grown[row, r, k] = c_total[i] * chords[i, side, r, k]",
+        "grown[row, r, k] = 0.0 * chords[i, side, r, k]",
         (REMAINDER,),
     ),
     Fault(
