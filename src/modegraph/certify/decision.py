@@ -27,11 +27,21 @@ class Decision:
         """Decide the wanted goals, and the check for all starts."""
         exploration = self.exploration
         found = exploration.explore(piece, wanted, safety)
-        if exploration.common:
-            if self._all_at_once(found) or time.monotonic() > exploration.deadline:
-                return found
+        if not exploration.common:
+            self._each_alone(found)
+        elif not self._all_at_once(found) and time.monotonic() <= exploration.deadline:
             exploration.common, exploration.parts = False, 0
-            found = exploration.explore(piece, wanted, safety)
+            proofs, lasting = found.proofs, found.safety
+            left = [j for j in wanted if j not in proofs]
+            found = exploration.explore(piece, left, safety and lasting is None)
+            self._each_alone(found)
+            found.proofs = proofs | found.proofs
+            found.safety = found.safety or lasting
+        return found
+
+    def _each_alone(self, found: Findings) -> None:
+        """Let the chains of the parked flows, which went on alone for a while, go on together from there."""
+        exploration = self.exploration
         if found.parked:
             chains = [exploration.chains[flow] for flow in found.parked]
             parts = [part for part in chains if not part.parked]
@@ -40,7 +50,6 @@ class Decision:
             groups = [open_chains] if autonomous else [[part] for part in open_chains]
             parts += [part for group in groups if group for part in self._in_groups(group, found)]
             self._finish(found, parts)
-        return found
 
     def _all_at_once(self, found: Findings) -> bool:
         """Let all parked flows go on as one; False where parts that go on alone may show more."""
@@ -55,10 +64,8 @@ class Decision:
         part = self.exploration.follow([following], flows, found, park=False)
         missing = [j for j in found.waiting if j not in part.proofs]
         undecided = bool(missing) or (found.waiting_safety is not None and part.safety is None)
-        if undecided and len(flows) > 1:
-            return False
         self._finish(found, [part])
-        return True
+        return not undecided or len(flows) == 1
 
     def _after(self, flows: Sequence[Flow]) -> Flow | None:
         first = len(flows) == 1 and flows[0].piece.chart.original
