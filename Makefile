@@ -35,7 +35,7 @@ test: lint
 	$(PYTEST) -n 2 --dist worksteal -m "not campaign"
 
 soundness: .venv/.develop
-	$(PYTEST) -n 2 --dist worksteal -m campaign tests/soundness
+	$(PYTEST) -n 2 --dist worksteal -m campaign -o faulthandler_timeout=0 tests/soundness
 
 mutants: .venv/.develop
 	$(BIN)/python -m tests.mutants
