@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import modegraph as mg
 from modegraph.reach import chain as chain_module
 from modegraph.reach import flowpipe as module
-from modegraph.reach.chain import Chain, nonlinear_variable
+from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.flow import Flow, Order
 from modegraph.reach.flowpipe import Flowpipe
@@ -214,19 +214,3 @@ def test_cutting_on_the_way_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     pipe = mg.flowpipe(van_der_pol(), horizon=END)
     assert not pipe.complete
     assert "1 piece of the start set; no more are tried" in pipe.reason
-
-
-def test_a_second_cut_is_across_what_the_first_left_nonlinear() -> None:
-    """x' = y^2, y' = 2 x^2 from a square: x first, and then y, for the squares of half an x are a quarter."""
-    plant = mg.System(lambda x, u: np.array([x[1] ** 2, 2.0 * x[0] ** 2 + 0.0 * u[0]]), states=2, inputs=1)
-    mode = mg.Mode(
-        "grow",
-        plant,
-        controller=lambda x: 0.0 * x[0],
-        reference=mg.setpoint([0.0]),
-        start=mg.Box([-0.2, -0.2], [0.2, 0.2]),
-        output=lambda x: x[:1],
-    )
-    flow = run_of(mode, 0.2).flows[0]
-    assert nonlinear_variable(flow) == 0
-    assert nonlinear_variable(flow, cut=0) == 1

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 import modegraph as mg
 from modegraph.reach import passage as module
-from modegraph.reach.chain import nonlinear_variable
 from modegraph.reach.compiled import CompiledMode, compile_mode
+from modegraph.reach.cuts import nonlinear_variable
 from modegraph.reach.flow import Flow, Order
 from modegraph.reach.framing import generator_box
 from modegraph.reach.own_time import in_own_time

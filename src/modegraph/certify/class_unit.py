@@ -15,8 +15,9 @@ from ..expression.simplify import simplify
 from ..model.class_start import StartClass, returned_start
 from ..model.mode import Mode
 from ..model.sets.parametrised import ParametrisedSet
-from ..reach.chain import Chain, nonlinear_variable
+from ..reach.chain import Chain
 from ..reach.compiled import CompiledMode, compile_mode
+from ..reach.cuts import nonlinear_variable
 from ..reach.flow import Order
 from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
 from ..reach.ladder import CURVED

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..cores import in_parallel
 from ..enclosure.monomials import monomial_count
 from ..expression.tape import Tape
-from ..reach.chain import nonlinear_variable
+from ..reach.cuts import nonlinear_variable, parts_of_refused
 from ..reach.decay import SettledLoop
 from ..reach.field import Field
 from ..reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
@@ -41,8 +41,6 @@ DEEPEST_CUT = 7
 SETTLING = 4.0
 """Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
 TOO_MUCH_FEEDBACK = 0.5
-MUCH_TOO_LARGE = 0.05
-"""A part whose remainder feeds itself while it is this small, relative to the polynomial part, is quartered."""
 FAR = 2.0
 """A flow that waits or is given up is not compared with targets it was never nearer to than this, at any look."""
 WORTH_A_TAIL = 0.7
@@ -196,12 +194,13 @@ class Exploration:
             return found
         flow = found.flow
         assert flow is not None
-        variable = nonlinear_variable(flow) if cut_short else widest_variable(flow.bounds, flow.set_at(0)[0])
-        # No halves: the piece is proved to hold no start, though only now that it is cut.
-        pieces = piece.split(variable)
-        if found.refused and filled_share(flow) < MUCH_TOO_LARGE and piece.depth + 1 < DEEPEST_CUT:
-            across = nonlinear_variable(flow, cut=variable)
-            pieces = [part for half in pieces for part in half.split(across)]
+        # No pieces: this one is proved to hold no start, though only now that it is cut.
+        if found.refused:
+            pieces = parts_of_refused(flow, DEEPEST_CUT)
+        elif cut_short:
+            pieces = piece.split(nonlinear_variable(flow))
+        else:
+            pieces = piece.split(widest_variable(flow.bounds, flow.set_at(0)[0]))
         children: list[Findings] = []
         effort = 0 if found.refused else effort
         tasks = [partial(self.explore, child, again, check_again, effort) for child in pieces]

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.sets import Box
-from ..reach.chain import Chain, nonlinear_variable
+from ..reach.chain import Chain
 from ..reach.compiled import CompiledMode
+from ..reach.cuts import nonlinear_variable
 from .continuous import ContinuousReferences
 from .evidence import proved
 from .moments import moments_of

@@ -10,14 +10,12 @@ from copy import copy
 import numpy as np
 
 from .compiled import CompiledMode
+from .cuts import nonlinear_variable
 from .field import Field
 from .flow import LATE_FEEDBACK, RESTART_STEPS, Flow, Order
 from .parallelotope import mode_gap
 from .restart import WIDE_GAP, halved, restarted
 from .start import Piece
-
-EQUAL = 1e-6
-"""Shares that differ by less, relatively, are equal."""
 
 
 class Chain:
@@ -115,25 +113,3 @@ class Chain:
         """Instant until which everything is enclosed, seconds."""
         steps = self.flows[-1].steps
         return steps[-1].end if steps else 0.0
-
-
-def nonlinear_variable(flow: Flow, cut: int | None = None) -> int:
-    """The variable to cut: with the largest share in a kink the starts are astride of, else in the nonlinear
-    terms early in the flow, else in the width. Among equals the one that was cut least.
-
-    ``cut``: a variable that is cut already; squares of its halves are a quarter.
-    """
-    p, _ = flow.set_at(max(1, len(flow.steps) // 3) if flow.steps else 0)
-    exponents = flow.bounds.exponents
-    weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
-    higher = exponents.sum(axis=1) > 1
-    share = np.zeros((2, flow.piece.variables))
-    for v in range(flow.piece.variables):
-        reads = exponents[:, v] > 0
-        for row, used in enumerate((reads & higher, reads)):
-            share[row, v] = float((np.abs(p[:, used]) * exponents[used, v]).sum(axis=1) @ weight)
-    chosen = flow.astride if flow.astride is not None else share[0] if share[0].any() else share[1]
-    if cut is not None:
-        chosen = np.where(np.arange(len(chosen)) == cut, 0.25 * chosen, chosen)
-    largest = chosen >= (1.0 - EQUAL) * chosen.max()
-    return int(np.argmax(np.where(largest, flow.piece.radius, -1.0)))

@@ -17,8 +17,9 @@ from ..cores import in_parallel, one_core
 from ..errors import ModegraphError
 from ..model.mode import Mode
 from ..model.sets import Box, Set
-from .chain import Chain, nonlinear_variable
+from .chain import Chain
 from .compiled import CompiledMode, compile_mode
+from .cuts import nonlinear_variable
 from .field import Field
 from .flow import Order
 from .ladder import class_orders, is_light, orders
