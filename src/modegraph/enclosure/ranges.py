@@ -1,12 +1,72 @@
-"""Upper bounds of polynomials over boxes inside [-1, 1]^m, bisected only as far as asked (numba)."""
+"""Upper bounds of polynomials over boxes inside [-1, 1]^m, and balls in them, bisected only as far as asked (numba)."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL
+from .polynomial import KERNEL, SHORT
 from .rounding import TINY, UNIT, UP
+
+ODD, EVEN = 1, 2
+"""Monomials of degree two and more that range over [-1, 1], and over [0, 1]."""
+
+
+@njit(**SHORT)
+def linear_bound(c, radius, middle):
+    """sup of sum_v c[v] eta_v over eta in [-1, 1]^m, rounded up.
+
+    Where ``radius`` is not empty, only eta with |middle + radius eta|_2 <= 1 in the first variables count.
+    """
+    size = 0.0
+    for v in range(c.size):
+        size += abs(c[v])
+    box = size * (1.0 + 4.0 * c.size * UNIT)
+    m = radius.size
+    if m == 0:
+        return box
+    # Scaled before squaring: tiny coefficients must not underflow to a length of zero.
+    top = 1e-300
+    for v in range(m):
+        top = max(top, abs(c[v] / radius[v]))
+    square = 0.0
+    ball = 0.0
+    plain = 0.0
+    for v in range(m):
+        x = c[v] / radius[v]
+        square += (x / top) ** 2
+        ball -= x * middle[v]
+        plain += abs(x)
+    ball += np.sqrt(square) * top
+    for v in range(m, c.size):
+        ball += abs(c[v])
+    ball += (plain + size) * (8.0 * (m + 4)) * UNIT + m * 1e-307
+    return ball if ball < box else box
+
+
+@njit(**SHORT)
+def upper_bounds(polynomials, kinds, linear, variables, count, radius, middle, rounding):
+    """Upper bounds (r,) of polynomials (r, N) over a piece.
+
+    kinds : (N,) ODD, EVEN, or 0 for the constant and what is linear
+    linear, variables : monomials that are variables, and which of the ``count`` variables each is
+    """
+    out = np.zeros(polynomials.shape[0])
+    c = np.zeros(count)
+    for i in range(out.size):
+        for k in range(linear.size):
+            c[variables[k]] = polynomials[i, linear[k]]
+        size = 0.0
+        total = polynomials[i, 0] + linear_bound(c, radius, middle)
+        for k in range(polynomials.shape[1]):
+            x = polynomials[i, k]
+            size += abs(x)
+            if kinds[k] == ODD:
+                total += abs(x)
+            elif kinds[k] == EVEN and x > 0.0:
+                total += x
+        out[i] = total + rounding * size + TINY
+    return out
 
 
 @njit(**KERNEL)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.monomials import Monomials
-from ..enclosure.ranges import upper_bound
+from ..enclosure.ranges import EVEN, ODD, upper_bound, upper_bounds
 from ..enclosure.rounding import TINY, UNIT
 from .start import Piece
 
@@ -30,6 +30,7 @@ class PolynomialBounds:
         even = higher & (self.exponents % 2 == 0).all(axis=1)
         self.even = np.flatnonzero(even)
         self.odd = np.flatnonzero(higher & ~even)
+        self._kinds = np.where(even, EVEN, np.where(higher, ODD, 0))
         self.rounding = 4.0 * (size + 8) * UNIT
 
     def linear_part(self, polynomials: Floats) -> Floats:
@@ -40,10 +41,11 @@ class PolynomialBounds:
 
     def upper(self, polynomials: Floats) -> Floats:
         """Upper bounds (...) of polynomials (..., N) over the piece."""
-        nonlinear = np.abs(polynomials[..., self.odd]).sum(axis=-1)
-        nonlinear += np.maximum(polynomials[..., self.even], 0.0).sum(axis=-1)
-        total = polynomials[..., 0] + self.piece.linear_bound(self.linear_part(polynomials)) + nonlinear
-        return np.asarray(total + self.rounding * np.abs(polynomials).sum(axis=-1) + TINY)
+        rows = np.ascontiguousarray(polynomials).reshape(-1, polynomials.shape[-1])
+        bounds = upper_bounds(
+            rows, self._kinds, self.linear, self.variables, self.piece.variables, *self.piece.ball, self.rounding
+        )
+        return np.asarray(bounds.reshape(polynomials.shape[:-1]))
 
     def ranges(self, polynomials: Floats) -> tuple[Floats, Floats]:
         """Lower and upper bounds (...) of polynomials (..., N)."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..enclosure.ranges import linear_bound
 from ..enclosure.rounding import UNIT
 from .flow import Flow, generator_box
 
@@ -108,7 +109,7 @@ class Slicer:
             linear = bounds.linear_part(p)
             rest = p.copy()
             rest[bounds.linear] = 0.0
-            straight = float(bounds.piece.linear_bound(linear))
+            straight = float(linear_bound(linear, *bounds.piece.ball))
             total = straight + bounds.refined_upper(rest, limit - straight, cells)
             best = min(best, float(np.nextafter(total, np.inf)))
         return best

@@ -237,25 +237,12 @@ class Piece:
                 hi[v] = min(hi[v], (hull[1][k] - centre) / radius + slack)
         return True
 
-    def linear_bound(self, coefficients: Floats) -> Floats:
-        """sup over the piece of sum_v coefficients[..., v] eta_v, eta the scaled variables; rounded up.
+    @cached_property
+    def ball(self) -> tuple[Floats, Floats]:
+        """(radius, middle): the variables of a round start are middle + radius eta, in the unit ball; else nothing."""
+        m = self.chart.free if self.chart.round else 0
+        return np.maximum(self.radius[:m], 1e-300), self.middle[:m].copy()
 
-        For round starts the bound from the unit ball is used where it is smaller.
-        """
-        size = np.abs(coefficients)
-        box = size.sum(axis=-1)
-        if not self.chart.round or self.chart.free == 0:
-            return box * (1.0 + 4.0 * len(self.lo) * UNIT)
-        m = self.chart.free
-        radius = np.maximum(self.radius[:m], 1e-300)
-        plain = coefficients[..., :m] / radius
-        with np.errstate(over="ignore"):
-            # Scaled before squaring: tiny coefficients must not underflow to a length of zero.
-            top = np.maximum(np.abs(plain).max(axis=-1, initial=0.0), 1e-300)
-            ball = np.sqrt(((plain / top[..., None]) ** 2).sum(axis=-1)) * top - plain @ self.middle[:m]
-        ball = ball + size[..., m:].sum(axis=-1)
-        slack = (np.abs(plain).sum(axis=-1) + box) * (8.0 * (m + 4)) * UNIT + m * 1e-307
-        return np.asarray(np.fmin(box * (1.0 + 4.0 * len(self.lo) * UNIT), ball + slack))
 
 
 def whole(start: Set, unknowns: Sequence[tuple[float, float]], parameters: int = 0) -> Piece:
