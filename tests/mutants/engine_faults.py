@@ -49,9 +49,9 @@ ENGINE_FAULTS = (
     ),
     Fault(
         "old generators are thinned without a box",
-        "reach/framing.py",
-        "    out[len(G) + np.arange(n), np.arange(n), 0] = generator_box(G[:, :, kept:])\n",
-        "",
+        "enclosure/polynomial.py",
+        "        out[count + i, i, 0] = box[i]\n",
+        "        out[count + i, i, 0] = 0.0\n",
         ("tests/reach/test_framing.py",),
     ),
     Fault(

@@ -8,6 +8,7 @@ from numba import njit
 from .adjoint import tighten
 from .jets import solve_in_time
 from .polynomial import SHORT
+from .ranges import piece_bound
 from .remainder import coefficient_norms, remainders, wants_another_try
 from .rounding import TINY, UNIT, UP
 from .step import truncate_inputs
@@ -78,6 +79,28 @@ def observe_step(
             slack[i, 0] = np.inf
             slack[i, 1] = np.inf
     return ends, slack
+
+
+@njit(**SHORT)
+def observed_bounds(ends, slack, faces, kinds, linear, radius, middle, rounding):
+    """Upper bounds over a piece (``piece_bound``) of the first ``faces`` outputs of ``observe_step``, and of the
+    sizes of the outputs that follow after one more."""
+    upper = np.zeros(faces)
+    for i in range(faces):
+        top = -np.inf
+        for side in range(2):
+            top = max(top, piece_bound(ends[side, i], 1.0, kinds, linear, radius, middle, rounding))
+        top += slack[i, 0]
+        # Ends are added and compared in floats: one rounding each.
+        upper[i] = top + 4.0 * UNIT * abs(top)
+    sizes = np.zeros(ends.shape[1] - faces - 1)
+    for i in range(sizes.size):
+        o = faces + 1 + i
+        for side in range(2):
+            for sign in (1.0, -1.0):
+                sizes[i] = max(sizes[i], piece_bound(ends[side, o], sign, kinds, linear, radius, middle, rounding))
+        sizes[i] += slack[o, 0]
+    return upper, sizes
 
 
 @njit(**SHORT)

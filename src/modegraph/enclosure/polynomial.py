@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .rounding import UNIT
+
 KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy"}
 SHORT = {**KERNEL, "nogil": False}
 """For kernels of less than a tenth of a millisecond: giving the interpreter lock away costs more than it gains."""
@@ -67,13 +69,30 @@ def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
 
 
 @njit(**SHORT)
-def absolute_sums(G):
-    """Sums (n,) of |G[g, i, k]| over g and k."""
+def box_of_generators(G, first):
+    """Radii (n,) of a box around sum_g G_g(xi) zeta_g, without the coefficients before ``first``, rounded up."""
     out = np.zeros(G.shape[1])
     for g in range(G.shape[0]):
         for i in range(G.shape[1]):
-            for k in range(G.shape[2]):
+            for k in range(first, G.shape[2]):
                 out[i] += abs(G[g, i, k])
+    for i in range(out.size):
+        out[i] *= 1.0 + (G.shape[0] * G.shape[2] + 4) * UNIT * 2.0
+    return out
+
+
+@njit(**SHORT)
+def thin_generators(G, kept):
+    """Generators that hold the same sets with the first ``kept`` coefficients only; axes for the others."""
+    count, n, _ = G.shape
+    out = np.zeros((count + n, n, kept))
+    for g in range(count):
+        for i in range(n):
+            for k in range(kept):
+                out[g, i, k] = G[g, i, k]
+    box = box_of_generators(G, kept)
+    for i in range(n):
+        out[count + i, i, 0] = box[i]
     return out
 
 

@@ -22,56 +22,59 @@ def quadratic_bound(H, G0, G1, spread):
     """
     n = spread.size
     count = G0.shape[0] + n
-    a0 = np.zeros((count, n))
-    a1 = np.zeros((count, n))
-    for a in range(count - n):
-        for v in range(n):
-            a0[a, v] = G0[a, v]
-            a1[a, v] = G1[a, v]
+    # Generators side by side: the loops over all of them are vectorised.
+    a0 = np.zeros((n, count))
+    a1 = np.zeros((n, count))
     for v in range(n):
-        a0[count - n + v, v] = spread[v]
-        a1[count - n + v, v] = spread[v]
+        for a in range(count - n):
+            a0[v, a] = G0[a, v]
+            a1[v, a] = G1[a, v]
+        a0[v, count - n + v] = spread[v]
+        a1[v, count - n + v] = spread[v]
     total = np.zeros(n)
-    for a in range(count):
-        for k in range(n):
-            total[k] += max(abs(a0[a, k]), abs(a1[a, k]))
+    for k in range(n):
+        for a in range(count):
+            total[k] += max(abs(a0[k, a]), abs(a1[k, a]))
     out = np.zeros(n)
-    h0 = np.zeros(n)
-    h1 = np.zeros(n)
+    x = np.zeros((4, count))
+    sums = np.zeros((3, count))
     for i in range(n):
-        s00 = 0.0
-        s01 = 0.0
-        s11 = 0.0
         size = 0.0
+        for k in range(n):
+            for l in range(n):
+                size += abs(H[i, k, l]) * total[k] * total[l]
+        sums[:] = 0.0
         for b in range(count):
+            x[:] = 0.0
             for k in range(n):
-                h0[k] = 0.0
-                h1[k] = 0.0
+                h0 = 0.0
+                h1 = 0.0
                 for l in range(n):
-                    h0[k] += H[i, k, l] * a0[b, l]
-                    h1[k] += H[i, k, l] * a1[b, l]
-                    size += abs(H[i, k, l]) * max(abs(a0[b, l]), abs(a1[b, l])) * total[k]
+                    h0 += H[i, k, l] * a0[l, b]
+                    h1 += H[i, k, l] * a1[l, b]
+                for a in range(count):
+                    x[0, a] += a0[k, a] * h0
+                    x[1, a] += a0[k, a] * h1
+                    x[2, a] += a1[k, a] * h0
+                    x[3, a] += a1[k, a] * h1
             for a in range(count):
-                x00 = 0.0
-                x01 = 0.0
-                x10 = 0.0
-                x11 = 0.0
-                for k in range(n):
-                    x00 += a0[a, k] * h0[k]
-                    x01 += a0[a, k] * h1[k]
-                    x10 += a1[a, k] * h0[k]
-                    x11 += a1[a, k] * h1[k]
-                s00 += abs(x00)
-                s01 += 0.5 * (abs(x01) + abs(x10))
-                s11 += abs(x11)
-        out[i] = (0.5 * max(s00, max(s01, s11)) + 1.01 * (2 * n + 4) * UNIT * size) * UP + TINY
+                sums[0, a] += abs(x[0, a])
+                sums[1, a] += 0.5 * (abs(x[1, a]) + abs(x[2, a]))
+                sums[2, a] += abs(x[3, a])
+        top = 0.0
+        for row in range(3):
+            s = 0.0
+            for a in range(count):
+                s += sums[row, a]
+            top = max(top, s)
+        out[i] = (0.5 * top + 1.01 * (2 * n + 4) * UNIT * size) * UP + TINY
     return out
 
 
 @njit(**KERNEL)
-def main_generators(G0, G1, most, spread):
-    """Constant coefficients of the ``most`` largest generators at both ends, (K, n) each; what is left
-    out, and everything that depends on the set variables, is added to ``spread`` (n,)."""
+def main_generators(G0, G1, most):
+    """Constant coefficients of the ``most`` largest generators at both ends, (K, n) each, and a box (n,)
+    for what is left out and everything that depends on the set variables."""
     count, n, Nq = G0.shape
     scale = np.zeros(n)
     for a in range(count):
@@ -85,6 +88,7 @@ def main_generators(G0, G1, most, spread):
     kept = min(most, count)
     out0 = np.zeros((kept, n))
     out1 = np.zeros((kept, n))
+    spread = np.zeros(n)
     for r in range(count):
         a = ranked[r]
         for i in range(n):
@@ -99,4 +103,4 @@ def main_generators(G0, G1, most, spread):
                 out1[r, i] = G1[a, i, 0]
     for i in range(n):
         spread[i] *= UP
-    return out0, out1
+    return out0, out1, spread

@@ -45,27 +45,36 @@ def linear_bound(c, radius, middle):
 
 
 @njit(**SHORT)
-def upper_bounds(polynomials, kinds, linear, variables, count, radius, middle, rounding):
-    """Upper bounds (r,) of polynomials (r, N) over a piece.
+def piece_bound(polynomial, sign, kinds, linear, radius, middle, rounding):
+    """Upper bound of a polynomial (N,) times a sign over a piece; infinite where it is no number.
 
     kinds : (N,) ODD, EVEN, or 0 for the constant and what is linear
-    linear, variables : monomials that are variables, and which of the ``count`` variables each is
+    linear : (m,) which monomial each variable is, -1: none
+    rounding : of a sum of N terms, relative to their sizes
     """
+    c = np.zeros(linear.size)
+    for v in range(linear.size):
+        if linear[v] >= 0:
+            c[v] = sign * polynomial[linear[v]]
+    total = sign * polynomial[0] + linear_bound(c, radius, middle)
+    size = 0.0
+    for k in range(polynomial.size):
+        x = sign * polynomial[k]
+        size += abs(x)
+        if kinds[k] == ODD:
+            total += abs(x)
+        elif kinds[k] == EVEN and x > 0.0:
+            total += x
+    total += rounding * size + TINY
+    return total if total == total else np.inf
+
+
+@njit(**SHORT)
+def piece_bounds(polynomials, kinds, linear, radius, middle, rounding):
+    """Upper bounds (r,) of polynomials (r, N) over a piece."""
     out = np.zeros(polynomials.shape[0])
-    c = np.zeros(count)
     for i in range(out.size):
-        for k in range(linear.size):
-            c[variables[k]] = polynomials[i, linear[k]]
-        size = 0.0
-        total = polynomials[i, 0] + linear_bound(c, radius, middle)
-        for k in range(polynomials.shape[1]):
-            x = polynomials[i, k]
-            size += abs(x)
-            if kinds[k] == ODD:
-                total += abs(x)
-            elif kinds[k] == EVEN and x > 0.0:
-                total += x
-        out[i] = total + rounding * size + TINY
+        out[i] = piece_bound(polynomials[i], 1.0, kinds, linear, radius, middle, rounding)
     return out
 
 

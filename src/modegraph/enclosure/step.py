@@ -282,18 +282,18 @@ def flow_step(
                 for l in range(n):
                     hess[i, k, l] = hessian[i * n + k, l] / ebox[l]
         shrink = np.ones(n)
+        main0, main1, other = main_generators(G, H_end, MAIN_GENERATORS)
         # Twice: once e is proved to stay within ``need``, the Jacobian swings only with that.
         for final in range(2):
             # f(p + e) - f(p) = int_0^1 J(p + l e) dl e: powers of l e count by half at most. The main
             # part of that, e' H e / 2 with a constant H, is bounded over the zonotope of e, and then
             # acts as a push from outside; in a row where that gains nothing it stays in the Jacobian.
-            spread = dropped.copy()
+            spread = np.zeros(n)
             for r in range(n):
-                s = u[r] + ybox[r]
+                s = dropped[r] + other[r] + u[r] + ybox[r]
                 for k in range(n):
                     s += curve[r, k] * z[k]
-                spread[r] += s * UP
-            main0, main1 = main_generators(G, H_end, MAIN_GENERATORS, spread)
+                spread[r] = s * UP
             push = quadratic_bound(hess, main0, main1, spread)
             for i in range(n):
                 whole = 0.0

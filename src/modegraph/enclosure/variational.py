@@ -273,6 +273,8 @@ def apply_matrix(J, dJ, vector, n, q, factor, product, offset, start, degree):
 
 BLOCK = 64
 """Generators transported side by side: one look at the table of products serves all of them."""
+LINE = 8
+"""Numbers in a line of the cache."""
 
 
 @njit(**KERNEL)
@@ -290,38 +292,46 @@ def advance_generators(F, G, q, pairs, product, offset, start, degree):
                 for k in range(start[d], start[d + 1]):
                     nF[r, c, d] += abs(F[r, c, k])
                 sF[r, c] += nF[r, c, d]
-    tail = np.zeros(q + 2)
+    sizes = np.zeros((n, q + 1))
     before = np.zeros((n, Nq, BLOCK))
     after = np.zeros((n, Nq, BLOCK))
+    size = np.zeros(BLOCK)
     for first in range(0, count, BLOCK):
         most = min(BLOCK, count - first)
         top = np.full(n, -1, np.int64)
         for c in range(n):
-            for g in range(most):
-                tail[:] = 0.0
-                for d in range(q, -1, -1):
-                    s = 0.0
-                    for k in range(start[d], start[d + 1]):
-                        s += abs(G[first + g, c, k])
-                    tail[d] = tail[d + 1] + s
-                    if s > 0.0:
-                        top[c] = max(top[c], d)
-                for r in range(n):
-                    for d in range(1, q + 1):
-                        lost[r] += nF[r, c, d] * tail[q + 1 - d]
-                    lost[r] += gamma * sF[r, c] * tail[0]
-            for k in range(Nq):
+            for k0 in range(0, Nq, LINE):
                 for g in range(most):
-                    before[c, k, g] = G[first + g, c, k]
+                    for k in range(k0, min(k0 + LINE, Nq)):
+                        before[c, k, g] = G[first + g, c, k]
+            for d in range(q + 1):
+                size[:] = 0.0
+                for k in range(start[d], start[d + 1]):
+                    for g in range(BLOCK):
+                        size[g] += abs(before[c, k, g])
+                s = 0.0
+                for g in range(most):
+                    s += size[g]
+                sizes[c, d] += s
+                if s > 0.0:
+                    top[c] = d
         after[:] = 0.0
         for r in range(n):
             for c in range(n):
                 if top[c] >= 0:
                     _multiply_block(after[r], F[r, c], before[c], top[c], q, product, offset, start, degree)
-        for g in range(most):
-            for r in range(n):
-                for k in range(Nq):
-                    H[first + g, r, k] = after[r, k, g]
+            for k0 in range(0, Nq, LINE):
+                for g in range(most):
+                    for k in range(k0, min(k0 + LINE, Nq)):
+                        H[first + g, r, k] = after[r, k, g]
+    for r in range(n):
+        for c in range(n):
+            tail = 0.0
+            for d in range(q, -1, -1):
+                tail += sizes[c, d]
+                if d > 0:
+                    lost[r] += nF[r, c, q + 1 - d] * tail
+            lost[r] += gamma * sF[r, c] * tail
     return H, lost * UP
 
 

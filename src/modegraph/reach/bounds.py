@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.monomials import Monomials
-from ..enclosure.ranges import EVEN, ODD, upper_bound, upper_bounds
+from ..enclosure.ranges import EVEN, ODD, piece_bounds, upper_bound
 from ..enclosure.rounding import TINY, UNIT
 from .start import Piece
 
@@ -30,8 +30,11 @@ class PolynomialBounds:
         even = higher & (self.exponents % 2 == 0).all(axis=1)
         self.even = np.flatnonzero(even)
         self.odd = np.flatnonzero(higher & ~even)
-        self._kinds = np.where(even, EVEN, np.where(higher, ODD, 0))
         self.rounding = 4.0 * (size + 8) * UNIT
+        kinds = np.where(even, EVEN, np.where(higher, ODD, 0))
+        linear = np.where(table.linear < size, table.linear, -1)
+        self.arrays = (kinds, linear, *piece.ball, self.rounding)
+        """What the kernels take."""
 
     def linear_part(self, polynomials: Floats) -> Floats:
         """Coefficients (..., m) of the variables themselves."""
@@ -42,10 +45,7 @@ class PolynomialBounds:
     def upper(self, polynomials: Floats) -> Floats:
         """Upper bounds (...) of polynomials (..., N) over the piece."""
         rows = np.ascontiguousarray(polynomials).reshape(-1, polynomials.shape[-1])
-        bounds = upper_bounds(
-            rows, self._kinds, self.linear, self.variables, self.piece.variables, *self.piece.ball, self.rounding
-        )
-        return np.asarray(bounds.reshape(polynomials.shape[:-1]))
+        return np.asarray(piece_bounds(rows, *self.arrays).reshape(polynomials.shape[:-1]))
 
     def ranges(self, polynomials: Floats) -> tuple[Floats, Floats]:
         """Lower and upper bounds (...) of polynomials (..., N)."""

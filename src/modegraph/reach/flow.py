@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure.monomials import Monomials, monomials
-from ..enclosure.observe import observe_step
+from ..enclosure.observe import observe_step, observed_bounds
 from ..enclosure.rounding import UNIT
 from ..enclosure.step import (
     DONE,
@@ -386,9 +386,7 @@ class Flow:
     def _observe(self, fld: Field, h: float, tube: Floats) -> tuple[Floats, Floats, float, Floats]:
         faces = len(fld.faces)
         ends, slack = self._observed(fld, h, tube, self.seen, 3)
-        errors = ends[:2, faces + 1 :]
-        tops = self.seen_bounds.upper(np.concatenate([ends[:2, :faces], errors, -errors], axis=1)).max(axis=0)
-        upper = tops[:faces] + slack[:faces, 0]
+        upper, tracking = observed_bounds(ends, slack, np.int64(faces), *self.seen_bounds.arrays)
         if faces and not (upper <= 0.0).all():
             fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, self.time_degree)
             fine = self.bounds.upper(fine_ends[:2, :faces]).max(axis=0) + fine_slack[:faces, 0]
@@ -397,11 +395,8 @@ class Flow:
                     limit = -fine_slack[i, 0]
                     refined = [self.bounds.refined_upper(fine_ends[s, i], limit) for s in (0, 1)]
                     fine[i] = min(fine[i], max(refined) + fine_slack[i, 0])
-            upper = np.minimum(upper, fine)
-        upper = np.where(np.isnan(upper), np.inf, upper)
-        # Ends are added and compared in floats: one rounding each.
-        upper = upper + 4.0 * UNIT * np.abs(upper)
-        tracking = tops[faces:].reshape(2, -1).max(axis=0) + slack[faces + 1 :, 0]
+            # Ends are added and compared in floats: one rounding each.
+            upper = np.fmin(upper, fine + 4.0 * UNIT * np.abs(fine))
         return upper, ends[2, faces], float(slack[faces, 1]), tracking
 
     def _observed(self, fld: Field, h: float, tube: Floats, q: int, K: int) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.polynomial import absolute_sums
+from ..enclosure.polynomial import box_of_generators, thin_generators
 from ..enclosure.rounding import UNIT
 from .field import Frame
 
@@ -31,18 +31,13 @@ def out_of_frame(frame: Frame, p: Floats, G: Floats) -> tuple[Floats, Floats]:
 
 def generator_box(G: Floats) -> Floats:
     """Radii (n,) of a box around sum_g G_g(xi) zeta_g, rounded up."""
-    count = G.shape[0] * G.shape[2]
-    return np.asarray(absolute_sums(np.ascontiguousarray(G)) * (1.0 + (count + 4) * UNIT * 2.0))
+    return np.asarray(box_of_generators(np.ascontiguousarray(G), np.int64(0)))
 
 
 def thinned(G: Floats, kept: int) -> Floats:
     """Generators that hold the same sets with the first ``kept`` coefficients only; boxes for the others."""
-    n = G.shape[1]
     if kept == 0:
         return np.diag(generator_box(G))[:, :, None]
     if G.shape[2] <= 2 * kept:
         return G
-    out = np.zeros((len(G) + n, n, kept))
-    out[: len(G)] = G[:, :, :kept]
-    out[len(G) + np.arange(n), np.arange(n), 0] = generator_box(G[:, :, kept:])
-    return out
+    return np.asarray(thin_generators(np.ascontiguousarray(G), np.int64(kept)))
