@@ -82,6 +82,40 @@ def box_of_generators(G, first):
 
 
 @njit(**SHORT)
+def generator_reach(A, G):
+    """Sums (f,) of |A G[g, :, k]| over g and k for the rows of A (f, n), and (n,) of |G[g, i, k]| (floats).
+
+    G may have further rows; they do not count.
+    """
+    rows, n = A.shape
+    Nq = G.shape[2]
+    reach = np.zeros((rows, Nq))
+    size = np.zeros((n, Nq))
+    work = np.zeros(Nq)
+    for g in range(G.shape[0]):
+        for i in range(n):
+            for k in range(Nq):
+                size[i, k] += abs(G[g, i, k])
+        for f in range(rows):
+            for k in range(Nq):
+                work[k] = A[f, 0] * G[g, 0, k]
+            for i in range(1, n):
+                for k in range(Nq):
+                    work[k] += A[f, i] * G[g, i, k]
+            for k in range(Nq):
+                reach[f, k] += abs(work[k])
+    total = np.zeros(rows)
+    for f in range(rows):
+        for k in range(Nq):
+            total[f] += reach[f, k]
+    sizes = np.zeros(n)
+    for i in range(n):
+        for k in range(Nq):
+            sizes[i] += size[i, k]
+    return total, sizes
+
+
+@njit(**SHORT)
 def thin_generators(G, kept):
     """Generators that hold the same sets with the first ``kept`` coefficients only; axes for the others."""
     count, n, _ = G.shape

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..enclosure.polynomial import generator_reach
 from ..enclosure.rounding import UNIT
 from .bounds import PolynomialBounds
 
@@ -45,10 +46,11 @@ class Quadric:
         n = self.dim
         turns, loose = [], np.ones(len(p))
         for k, G in enumerate(generators):
-            columns = np.concatenate([p[k, :, 1:].T, G[:, :n].transpose(0, 2, 1).reshape(-1, n)]) @ self.T.T
-            if not np.isfinite(columns).all():
+            columns = np.moveaxis(G[:, :n], 1, 0).reshape(n, -1)
+            spread = self.T @ (p[k, :, 1:] @ p[k, :, 1:].T + columns @ columns.T) @ self.T.T
+            if not np.isfinite(spread).all():
                 return [], loose
-            Q = np.linalg.eigh(columns.T @ columns)[1].T
+            Q = np.linalg.eigh(spread)[1].T
             miss = float(np.abs(Q @ Q.T - np.eye(n)).sum(axis=1).max()) + 8.0 * n * n * UNIT
             turns.append(Q @ self.T)
             loose[k] = 1.0 + miss + 8.0 * n * UNIT
@@ -130,11 +132,11 @@ def largest_singular_value(Y: Floats) -> Floats:
 def generator_sizes(A: Floats, generators: Sequence[Floats]) -> Floats:
     """(K, f): sum_g |A G_kg|_1 for each row of A, rounded up."""
     n = A.shape[1]
+    A = np.array(A)
     out = np.zeros((len(generators), len(A)))
     for k, G in enumerate(generators):
         if len(G):
-            columns = np.moveaxis(G[:, :n], 1, 0).reshape(n, -1)
-            size = np.abs(columns).sum(axis=1)
+            reach, size = generator_reach(A, np.ascontiguousarray(G))
             slack = 4.0 * (n + 2 + math.log2(G.size + 1)) * UNIT * (np.abs(A) @ size)
-            out[k] = np.abs(A @ columns).sum(axis=1) * (1.0 + 2.0 * G.size * UNIT) + slack
+            out[k] = reach * (1.0 + 2.0 * G.size * UNIT) + slack
     return out
