@@ -11,7 +11,7 @@ from numba import njit
 
 from .rounding import UNIT
 
-KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy"}
+KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 SHORT = {**KERNEL, "nogil": False}
 """For kernels of less than a tenth of a millisecond: giving the interpreter lock away costs more than it gains."""
 
