@@ -7,6 +7,7 @@ import pytest
 
 from modegraph.enclosure.quadratic import main_generators, quadratic_bound
 from modegraph.enclosure.variational import reduce_generators
+from modegraph.reach.quadric import generator_sizes
 
 
 def at(G: np.ndarray, xi: np.ndarray) -> np.ndarray:
@@ -46,6 +47,9 @@ def test_quadratic_bound_holds_and_follows_signs() -> None:
                 )
                 e = (1 - s) * zeta @ G0 + s * zeta @ G1 + spread * rng.choice([-1.0, 1.0], n)
                 assert (np.abs(np.einsum("ikl,k,l->i", H, e, e)) / 2 <= bound * (1 + 1e-12)).all()
+    # x y from the x axis to the y axis: 0 at both ends, 1/4 half way.
+    H = np.array([[[0.0, 1.0], [1.0, 0.0]]] * 2)
+    assert (quadratic_bound(H, np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros(2)) >= 0.25).all()
     # x y along (1, 1) and (1, -1): what the box adds is cancelled by the signs.
     H = np.array([[[1.0, 0.0], [0.0, -1.0]]] * 2)
     slow = np.array([[1.0, 1.0]])
@@ -65,3 +69,15 @@ def test_main_generators_put_the_rest_into_the_box() -> None:
             true = np.abs(((1 - s) * at(G0, xi) + s * at(G1, xi)) @ d).sum()
             kept = np.abs(((1 - s) * a0 + s * a1) @ d).sum()
             assert true <= (kept + np.abs(d) @ box) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("terms", [1, 3])
+def test_how_far_generators_reach_along_directions(terms: int) -> None:
+    """Each coefficient counts by itself; states beyond those of A do not."""
+    rng = np.random.default_rng(5)
+    A, G = rng.normal(size=(4, 2)), rng.normal(size=(6, 3, terms))
+    true = np.abs(np.einsum("fi,gik->fgk", A, G[:, :2])).sum(axis=(1, 2))
+    found = generator_sizes(A, [G, np.zeros((0, 3, 1))])
+    assert (found[0] >= true).all()
+    assert found[0] == pytest.approx(true, rel=1e-12)
+    assert (found[1] == 0.0).all()

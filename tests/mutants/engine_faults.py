@@ -28,16 +28,16 @@ ENGINE_FAULTS = (
     ),
     Fault(
         "even powers get their lower bound",
-        "reach/bounds.py",
-        "        nonlinear += np.maximum(polynomials[..., self.even], 0.0).sum(axis=-1)",
-        "        nonlinear += np.minimum(polynomials[..., self.even], 0.0).sum(axis=-1)",
+        "enclosure/ranges.py",
+        "        elif kinds[k] == EVEN and x > 0.0:",
+        "        elif kinds[k] == EVEN and x < 0.0:",
         ("tests/reach/test_bounds.py",),
     ),
     Fault(
         "a part of a ball is bounded as if centred",
-        "reach/start.py",
-        ".sum(axis=-1)) * top - plain @ self.middle[:m]",
-        ".sum(axis=-1)) * top",
+        "enclosure/ranges.py",
+        "        ball -= x * middle[v]",
+        "        ball -= 0.0",
         ("tests/reach/test_bounds.py",),
     ),
     Fault(

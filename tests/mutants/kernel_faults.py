@@ -258,10 +258,31 @@ KERNEL_FAULTS = (
         (OPERATIONS,),
     ),
     Fault(
+        "every second column of the flow moves no generator",
+        "enclosure/variational.py",
+        "y * second[j, g]",
+        "0.0 * y * second[j, g]",
+        (OPERATIONS,),
+    ),
+    Fault(
+        "constraints are bounded at the start of a step only",
+        "enclosure/observe.py",
+        "            top = max(top, piece_bound(ends[side, i], 1.0, kinds, linear, radius, middle, rounding))",
+        "            top = max(top, piece_bound(ends[0, i], 1.0, kinds, linear, radius, middle, rounding))",
+        ("tests/reach/test_flow.py", "tests/reach/test_flowpipe.py"),
+    ),
+    Fault(
+        "generators reach as far as their first coefficient",
+        "enclosure/polynomial.py",
+        "        for k in range(Nq):\n            total[f] += reach[f, k]",
+        "        for k in range(1):\n            total[f] += reach[f, k]",
+        (GENERATORS,),
+    ),
+    Fault(
         "transported generators lose their high degrees",
         "enclosure/variational.py",
-        "                        lost[r] += nF[r, c, d] * tail[q + 1 - d]\n",
-        "                        lost[r] += 0.0\n",
+        "                    lost[r] += nF[r, c, q + 1 - d] * tail\n",
+        "                    lost[r] += 0.0\n",
         (OPERATIONS,),
     ),
     Fault(
@@ -295,8 +316,8 @@ KERNEL_FAULTS = (
     Fault(
         "the quadratic push forgets the path between both ends",
         "enclosure/quadratic.py",
-        "0.5 * max(s00, max(s01, s11))",
-        "0.5 * min(s00, s11)",
+        "sums[1, a] += 0.5 * (abs(x[1, a]) + abs(x[2, a]))",
+        "sums[1, a] += 0.0",
         (GENERATORS,),
     ),
     Fault(
