@@ -7,10 +7,13 @@ import numpy as np
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.start import Chart, Piece
 from modegraph.reach.step_control import (
+    LEAST_ROOM,
     LEAST_TIME_DEGREE,
     LONGER,
     MOST_TIME_DEGREE,
+    ROOM,
     SLOW_RATE,
+    error_guess,
     feeding_cap,
     time_degree,
 )
@@ -48,3 +51,26 @@ def test_the_degree_in_time_falls_only_where_a_lower_one_is_still_accurate() -> 
 def test_the_degree_in_time_rises_where_the_error_is_seen() -> None:
     assert time_degree(5, 0.5, 0.3) == 6
     assert time_degree(MOST_TIME_DEGREE, 0.5, 0.3) == MOST_TIME_DEGREE
+
+
+def test_the_error_is_guessed_closely_where_it_grows_evenly() -> None:
+    remainder, grown = np.array([1.0, 2.0]), np.array([1.05, 1.02])
+    rest = np.array([0.1, 0.1])
+    tube, narrow, room = error_guess(np.array([1.04, 2.03]), rest, remainder, grown, 1.0)
+    # More than what grows as before, and less than a fifth more.
+    assert (tube > remainder * grown).all()
+    assert (tube < 1.1 * remainder).all()
+    assert (narrow > rest).all()
+    assert room == LEAST_ROOM
+    # A longer step lets it grow more.
+    longer, _, _ = error_guess(np.array([1.04, 2.03]), rest, remainder, grown, 1.6)
+    assert (longer > remainder * (1.0 + 1.6 * (grown - 1.0))).all()
+
+
+def test_nothing_is_foreseen_where_the_error_has_just_begun() -> None:
+    tube = np.array([1e-3, 1e-3])
+    for growth in (np.array([1e6, 1e6]), np.array([np.inf, np.nan])):
+        assert (error_guess(tube, tube, 0.5 * tube, growth, 1.0)[0] == ROOM * tube).all()
+    wide, _, room = error_guess(tube, tube, tube, None, 1.0)
+    assert (wide == ROOM * tube).all()
+    assert room == ROOM

@@ -160,7 +160,7 @@ def split_output(Q, o, KJ, q, embed, owner, errors, start, J, dJ, nJ, swing, hes
 def flow_step(
     ops, const, const_rad, outputs, variables,
     jops, jconst, jconst_rad, joutputs, jvariables,
-    states, p, G, radius, full_w, first_w, time_index, h, K, cut, KJ, q, KP, pairs, most, ebox0, ybox0,
+    states, p, G, radius, full_w, first_w, time_index, h, K, cut, KJ, q, KP, pairs, most, ebox0, ybox0, room,
     P, dg, norms, R, kinks, ranges, Q, dq, nQ, RQ, jkinks, jranges,
     product, offset, start, degree,
     jproduct, joffset, jstart, jdegree, jpairs, jcut, embed, owner, errors,
@@ -177,7 +177,8 @@ def flow_step(
 
     Returns (status, node, p_end (n, N), G_end, tube (n,), bend (n,), rest (n,), control (5,)) where
     tube bounds e over the whole step, bend the distance of p(s) from the chord p(0)..p(1), rest what
-    neither Psi e(0) nor the disturbance's columns carry (ybox0, ebox0: guesses of rest and tube), and
+    neither Psi e(0) nor the disturbance's columns carry (ybox0, ebox0: guesses of rest and tube, that at
+    least ``room`` times what e is at the start), and
     control = (time defect, other defect, spectral radius of h M, of h A0, share of e in what feeds e)
     for the step control.
     """
@@ -219,8 +220,8 @@ def flow_step(
     ybox = np.zeros(n)
     ebox = np.zeros(n)
     for i in range(n):
-        ybox[i] = max(1.3 * ybox0[i], 3.0 * defect[i]) + TINY
-        ebox[i] = max(1.2 * ebox0[i], 1.2 * (z[i] + 2.0 * defect[i])) + TINY
+        ybox[i] = max(ybox0[i], 3.0 * defect[i]) + TINY
+        ebox[i] = max(ebox0[i], room * (z[i] + 2.0 * defect[i])) + TINY
     need = ebox
     g = nothing
     u = nothing

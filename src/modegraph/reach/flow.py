@@ -28,7 +28,7 @@ from .passage import Passages
 from .pointwise import evaluate_over, workspace
 from .records import Failure, Order, Step
 from .start import Piece
-from .step_control import MOST_TIME_DEGREE, feeding_cap, time_degree
+from .step_control import MOST_TIME_DEGREE, error_guess, feeding_cap, time_degree
 
 Floats = NDArray[np.float64]
 
@@ -153,6 +153,7 @@ class Flow:
         """A box (n,) of the last remainder, in the coordinates of the fields."""
         self._ebox = np.zeros(n)
         self._ybox = np.zeros(n)
+        self._growth: Floats | None = None
         self._energy = np.zeros(seen)
         self.spent = energy
         self._energy_radius = energy
@@ -342,12 +343,14 @@ class Flow:
         outputs = j.outputs
         if not len(moving):
             outputs = np.concatenate([outputs[: n * n], outputs[n * n + n * fld.disturbances :]])
+        longer = h / (self.steps[-1].end - self.steps[-1].start) if self.steps else 1.0
+        guess = error_guess(self._ebox, self._ybox, self.remainder, self._growth, longer)
         return flow_step(
             f.ops, f.const, f.const_rad, f.outputs, f.variables,
             j.ops, j.const, j.const_rad, outputs, j.variables,
             n, inputs, self._G, moving, fld.full_w and len(moving) > 0, fld.first_w, fld.time_index,
             h, K, self._cut[: K + 1], KJ, self.q, FUNDAMENTAL_TIME_DEGREE,
-            self.table.pairs, most, self._ebox, self._ybox,
+            self.table.pairs, most, *guess,
             big["P"], big["dg"], big["norms"], big["R"], big["kinks"], big["ranges"],
             jac["P"], jac["dg"], jac["norms"], jac["R"], jac["kinks"], jac["ranges"],
             *self.table.arrays, *self._errors.table.arrays, self._errors.table.pairs,
@@ -377,6 +380,7 @@ class Flow:
             # Only the last remainder goes on; of the others the targets need no more than this.
             self.steps[-2].G = thinned(self.steps[-2].G, 0 if self.lean else 1 + self.piece.variables)
         self._p, self._G, self._ebox, self.time = step.p, step.G, step.tube, step.end
+        self._growth = step.tube / self.remainder if self.w_radius.any() else None
         self.remainder = generator_box(step.G)
         self._energy, self._energy_radius = step.energy, step.energy_radius
         if step.end >= self.fields[self.segment].end:

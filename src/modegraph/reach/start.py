@@ -244,7 +244,6 @@ class Piece:
         return np.maximum(self.radius[:m], 1e-300), self.middle[:m].copy()
 
 
-
 def whole(start: Set, unknowns: Sequence[tuple[float, float]], parameters: int = 0) -> Piece:
     """The piece that covers a bounded start set and all unknown constants, of which the last may be parameters."""
     cut: Sublevel | None = None

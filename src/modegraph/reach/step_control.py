@@ -1,11 +1,16 @@
-"""How long steps may be, beyond what their time error allows."""
+"""How long steps may be, beyond what their time error allows, and which error box is tried first."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .framing import generator_box
 from .start import Piece
+
+Floats = NDArray[np.float64]
 
 SLOW_RATE = 0.25
 """Largest spectral radius of h A0, A0 the Jacobian at the centre, at which nothing is gained by shorter steps."""
@@ -14,8 +19,36 @@ FEEDING = 0.05
 LONGER = 1.6
 """A step is at most this much longer than the one before."""
 MOST_TIME_DEGREE, LEAST_TIME_DEGREE = 8, 4
+"""Degrees of the Taylor polynomials in time."""
 ENOUGH, TOO_MUCH = 0.1, 0.3
 """Shares of the time error in what is allowed, at which a lower and a higher degree in time are tried."""
+
+ROOM, REST_ROOM = 1.2, 1.3
+"""The first guesses of the tube of the error and of its rest, relative to those of the step before."""
+NARROW_ROOM, NARROW_REST_ROOM, LEAST_ROOM = 1.03, 1.1, 1.01
+"""The same, relative to what is foreseen, where a disturbance makes the remainder grow evenly."""
+
+
+def error_guess(
+    tube: Floats, rest: Floats, remainder: Floats, growth: Floats | None, longer: float
+) -> tuple[Floats, Floats, float]:
+    """What ``flow_step`` tries first: the tube of the error (n,), its rest (n,), and the least tube relative to
+    the remainder and the defect.
+
+    The Jacobian is evaluated over all of it: what is guessed too wide feeds the remainder, what is guessed too
+    narrow costs a second try.
+
+    tube, rest : (n,) of the last step; zero at the beginning
+    remainder : (n,) box of the generators now
+    growth : (n,) the last tube relative to the remainder before it; None without a disturbance
+    longer : length of the next step relative to the last
+    """
+    if growth is None:
+        return ROOM * tube, REST_ROOM * rest, ROOM
+    foreseen = NARROW_ROOM * remainder * (1.0 + (growth - 1.0) * max(1.0, longer))
+    # Early in a flow, and where a state has no remainder yet, nothing can be foreseen.
+    widest = ROOM * np.maximum(tube, remainder)
+    return np.fmin(widest, foreseen), min(REST_ROOM, NARROW_REST_ROOM * max(1.0, longer)) * rest, LEAST_ROOM
 
 
 def feeding_cap(piece: Piece, outcome: Any) -> float:
