@@ -399,8 +399,8 @@ def flow_step(
         if accepted:
             break
         for i in range(n):
-            ebox[i] = max(ebox[i], 1.3 * need[i])
-            ybox[i] = max(ybox[i], 1.5 * g[i])
+            ebox[i] = max(ebox[i], 1.15 * need[i])
+            ybox[i] = max(ybox[i], 1.3 * g[i])
     if not accepted:
         return NO_CONTRACTION, 0, nothing_p, G, ebox, nothing, defect, control
     # p(1): K + 1 terms summed, at most K roundings.
