@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 import modegraph as mg
+from modegraph.certify.decision import Decision
 from modegraph.certify.exploration import Exploration
+from modegraph.certify.findings import Findings
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.reach.flow import Flow
 
@@ -81,3 +83,32 @@ def test_a_common_flow_begins_at_the_latest_of_the_ends(monkeypatch: pytest.Monk
     assert instants
     for first, latest, begin in instants:
         assert first < latest == begin
+
+
+def test_what_the_common_flow_proves_is_kept_when_the_parts_go_on_alone() -> None:
+    asked: list[tuple[list[int], bool]] = []
+    proof, lasting, late = object(), object(), object()
+
+    class Once:
+        """An exploration of which only the second run, each part alone, decides goal 1."""
+
+        common, parts, deadline = True, 7, float("inf")
+
+        def explore(self, piece: Any, wanted: Sequence[int], safety: bool) -> Findings:
+            asked.append((list(wanted), safety))
+            found: Any = Findings()
+            if not self.common:
+                found.proofs[1] = late
+            return found
+
+    class Half(Decision):
+        def _all_at_once(self, found: Any) -> bool:
+            found.proofs[0], found.safety = proof, lasting
+            return False
+
+    exploration: Any = Once()
+    found: Any = Half(exploration).decide(None, [0, 1, 2])  # type: ignore[arg-type]
+    assert asked == [([0, 1, 2], True), ([1, 2], False)]
+    assert (exploration.common, exploration.parts) == (False, 0)
+    assert found.proofs == {0: proof, 1: late}
+    assert found.safety is lasting
