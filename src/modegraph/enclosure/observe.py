@@ -84,7 +84,7 @@ def observe_step(
 @njit(**SHORT)
 def observed_bounds(ends, slack, faces, kinds, linear, radius, middle, rounding):
     """Upper bounds over a piece (``piece_bound``) of the first ``faces`` outputs of ``observe_step``, and of the
-    sizes of the outputs that follow after one more."""
+    sizes of the outputs that follow after one more. What is no number has the bound infinity."""
     upper = np.zeros(faces)
     for i in range(faces):
         top = -np.inf
@@ -92,14 +92,15 @@ def observed_bounds(ends, slack, faces, kinds, linear, radius, middle, rounding)
             top = max(top, piece_bound(ends[side, i], 1.0, kinds, linear, radius, middle, rounding))
         top += slack[i, 0]
         # Ends are added and compared in floats: one rounding each.
-        upper[i] = top + 4.0 * UNIT * abs(top)
+        upper[i] = top + 4.0 * UNIT * abs(top) if top == top else np.inf
     sizes = np.zeros(ends.shape[1] - faces - 1)
     for i in range(sizes.size):
         o = faces + 1 + i
         for side in range(2):
             for sign in (1.0, -1.0):
                 sizes[i] = max(sizes[i], piece_bound(ends[side, o], sign, kinds, linear, radius, middle, rounding))
-        sizes[i] += slack[o, 0]
+        size = sizes[i] + slack[o, 0]
+        sizes[i] = size if size == size else np.inf
     return upper, sizes
 
 
