@@ -7,9 +7,9 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 
-from . import measure, table
-from .cases import CASES
-from .figures import CLASSES, FIGURES, GOALS
+from benchmarks import measure, table
+from benchmarks.cases import CASES
+from benchmarks.figures import CLASSES, FIGURES, GOALS
 
 
 def row(what: str, value: float, goal: tuple[float, str]) -> None:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 import modegraph as mg
-
-from .case import Case, around
+from benchmarks.case import Case, around
 
 LENGTH, CENTRE, INERTIA = 1.0, 0.5, 1.0 / 12.0
 DELTA = INERTIA + CENTRE**2

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from . import arm, fields, flight
+from benchmarks import arm, fields, flight
 
 CASES = [*fields.CASES, *arm.CASES, *flight.CASES]

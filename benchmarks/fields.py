@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 import modegraph as mg
-
-from .case import Case, around, autonomous
+from benchmarks.case import Case, around, autonomous
 
 VDP_START = mg.Box([1.25, 2.35], [1.55, 2.45])
 CVDP_START = mg.Box([1.25, 2.35] * 2, [1.55, 2.45] * 2)

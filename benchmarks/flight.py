@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 import modegraph as mg
-
-from .case import Case, around, autonomous
+from benchmarks.case import Case, around, autonomous
 
 GRAVITY, MASS, JX, JY, JZ = 9.81, 1.4, 0.054, 0.054, 0.104
 MU, RADIUS, CHASER = 3.986e14 * 60**2, 42164e3, 500.0

@@ -12,11 +12,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 import modegraph as mg
-
-from .case import Case
-from .cases import CASES
-from .figures import FIGURES, Figures
-from .spread import sampled_spread
+from benchmarks.case import Case
+from benchmarks.cases import CASES
+from benchmarks.figures import FIGURES, Figures
+from benchmarks.spread import sampled_spread
 
 Result = TypeVar("Result")
 LONG = 10.0

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, solve_ivp
 
+from benchmarks.case import Case
 from modegraph.expression.evaluate import Evaluator
 from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.field import Field
-
-from .case import Case
 
 Floats = NDArray[np.float64]
 

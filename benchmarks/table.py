@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .figures import Figures
+from benchmarks.figures import Figures
 
 HEADER = (
     f"{'case':28s} {'seconds':>8s} {'goal':>5s} {'steps':>6s} {'pieces':>6s} {'width':>19s} {'/ spread':>13s} "

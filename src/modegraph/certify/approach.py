@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..model.sets import Ball, Ellipsoid, Sublevel
-from ..reach.framing import generator_box
-from .crossing import Nearest
-from .region import Region
-from .verdict import Approach, Floats
+from modegraph.certify.crossing import Nearest
+from modegraph.certify.region import Region
+from modegraph.certify.verdict import Approach, Floats
+from modegraph.model.sets import Ball, Ellipsoid, Sublevel
+from modegraph.reach.framing import generator_box
 
 
 def approach_of(nearest: Nearest | None, region: Region, names: Sequence[str]) -> Approach | None:

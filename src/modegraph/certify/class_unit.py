@@ -9,28 +9,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import ModegraphError
-from ..expression.scalar import Expr
-from ..expression.simplify import simplify
-from ..model.class_start import StartClass, returned_start
-from ..model.mode import Mode
-from ..model.sets.parametrised import ParametrisedSet
-from ..reach.chain import Chain
-from ..reach.compiled import CompiledMode, compile_mode
-from ..reach.cuts import nonlinear_variable
-from ..reach.flow import Order
-from ..reach.flowpipe import DEFAULT_HORIZON, Cutting
-from ..reach.ladder import CURVED
-from ..reach.start import Chart, Piece
-from ..reach.tail import Tail, TailFailure, TailSearch
-from .crossing import proved_instants
-from .evidence import lasting, proved, proved_until, sampled_violation, slack_until, width_over_time
-from .proof import SafetyProof, certified_check, least_slack
-from .refinement import Links
-from .relation import Relation
-from .target_class import TargetClass, target_class
-from .unit import TargetSpec
-from .verdict import Floats, Status, Verdict
+from modegraph.certify.crossing import proved_instants
+from modegraph.certify.evidence import lasting, proved, proved_until, sampled_violation, slack_until, width_over_time
+from modegraph.certify.proof import SafetyProof, certified_check, least_slack
+from modegraph.certify.refinement import Links
+from modegraph.certify.relation import Relation
+from modegraph.certify.target_class import TargetClass, target_class
+from modegraph.certify.unit import TargetSpec
+from modegraph.certify.verdict import Floats, Status, Verdict
+from modegraph.errors import ModegraphError
+from modegraph.expression.scalar import Expr
+from modegraph.expression.simplify import simplify
+from modegraph.model.class_start import StartClass, returned_start
+from modegraph.model.mode import Mode
+from modegraph.model.sets.parametrised import ParametrisedSet
+from modegraph.reach.chain import Chain
+from modegraph.reach.compiled import CompiledMode, compile_mode
+from modegraph.reach.cuts import nonlinear_variable
+from modegraph.reach.flow import Order
+from modegraph.reach.flowpipe import DEFAULT_HORIZON, Cutting
+from modegraph.reach.ladder import CURVED
+from modegraph.reach.start import Chart, Piece
+from modegraph.reach.tail import Tail, TailFailure, TailSearch
 
 MOST_PARTS = 32
 LEAST_DEGREE, MOST_MONOMIALS = 3, 400

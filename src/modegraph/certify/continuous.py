@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModegraphError
-from ..model.sets import Box
-from .references import Parameter, match_parameter
-from .relation import Relation
+from modegraph.certify.references import Parameter, match_parameter
+from modegraph.certify.relation import Relation
+from modegraph.errors import ModegraphError
+from modegraph.model.sets import Box
 
 Floats = NDArray[np.float64]
 Side = Box | tuple[Parameter, ...]

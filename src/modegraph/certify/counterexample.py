@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
-from ..expression.evaluate import Evaluator
-from ..expression.tape import Tape
-from ..model.mode import Mode
-from ..model.sets import Box, Set, is_subset
-from ..reach.compiled import CompiledMode
-from ..reach.field import Field
-from ..reach.flow import Flow, Order
-from ..reach.start import point
-from .region import Region
-from .verdict import Unproved, Witness
+from modegraph.certify.region import Region
+from modegraph.certify.verdict import Unproved, Witness
+from modegraph.enclosure.rounding import UNIT
+from modegraph.expression.evaluate import Evaluator
+from modegraph.expression.tape import Tape
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Box, Set, is_subset
+from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.field import Field
+from modegraph.reach.flow import Flow, Order
+from modegraph.reach.start import point
 
 Floats = NDArray[np.float64]
 

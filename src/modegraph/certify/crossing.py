@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.tape import Tape
-from ..reach.bounds import PolynomialBounds
-from ..reach.cells import Restriction
-from ..reach.flow import Flow, generator_box
-from ..reach.start import Piece
-from .region import Region
-from .samples import powers_at, sample_variables
+from modegraph.certify.region import Region
+from modegraph.certify.samples import powers_at, sample_variables
+from modegraph.expression.tape import Tape
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.cells import Restriction
+from modegraph.reach.flow import Flow, generator_box
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from ..reach.flow import Flow
-from ..reach.start import Piece
-from .exploration import Exploration
-from .findings import Findings, settle
-from .proof import safe_together, together
+from modegraph.certify.exploration import Exploration
+from modegraph.certify.findings import Findings, settle
+from modegraph.certify.proof import safe_together, together
+from modegraph.reach.flow import Flow
+from modegraph.reach.start import Piece
 
 
 class Decision:

@@ -6,13 +6,13 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from ..errors import ModegraphError
-from ..model.mode import Mode
-from ..model.sets import Set, Sublevel
-from ..model.sets.scaled import scaled
-from ..reach.compiled import CompiledMode, compile_mode
-from .decision import Decision
-from .unit import exploration_of
+from modegraph.certify.decision import Decision
+from modegraph.certify.unit import exploration_of
+from modegraph.errors import ModegraphError
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Set, Sublevel
+from modegraph.model.sets.scaled import scaled
+from modegraph.reach.compiled import CompiledMode, compile_mode
 
 LARGEST, SMALLEST = 2.0**20, 2.0**-20
 """Scales beyond which no larger, or smaller, one is tried."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .moments import Moments
-from .relation import Part, Relation
+from modegraph.certify.moments import Moments
+from modegraph.certify.relation import Part, Relation
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .crossing import Nearest
-from .verdict import Floats, Status, Verdict
+from modegraph.certify.crossing import Nearest
+from modegraph.certify.verdict import Floats, Status, Verdict
 
 
 @dataclass(frozen=True)

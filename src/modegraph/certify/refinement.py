@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.sets import Box
-from ..reach.chain import Chain
-from ..reach.compiled import CompiledMode
-from ..reach.cuts import nonlinear_variable
-from .continuous import ContinuousReferences
-from .evidence import proved
-from .moments import moments_of
-from .relation import Part, Relation, whole_relation
-from .target_class import TargetClass
+from modegraph.certify.continuous import ContinuousReferences
+from modegraph.certify.evidence import proved
+from modegraph.certify.moments import moments_of
+from modegraph.certify.relation import Part, Relation, whole_relation
+from modegraph.certify.target_class import TargetClass
+from modegraph.model.sets import Box
+from modegraph.reach.chain import Chain
+from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.cuts import nonlinear_variable
 
 Floats = NDArray[np.float64]
 

@@ -12,11 +12,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
-from ..errors import ModegraphError
-from ..model.sets import Ball, Box, Ellipsoid, Polytope, Set, Zonotope, exact
-from ..reach.bounds import PolynomialBounds
-from ..reach.quadric import Quadric, generator_sizes
+from modegraph.enclosure.rounding import UNIT
+from modegraph.errors import ModegraphError
+from modegraph.model.sets import Ball, Box, Ellipsoid, Polytope, Set, Zonotope, exact
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.quadric import Quadric, generator_sizes
 
 Floats = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.pairs import ROUNDED, first_crossings, part_gauges
-from ..model.sets import Box
-from .moments import Moments
-from .target_class import TargetClass
+from modegraph.certify.moments import Moments
+from modegraph.certify.target_class import TargetClass
+from modegraph.enclosure.pairs import ROUNDED, first_crossings, part_gauges
+from modegraph.model.sets import Box
 
 Floats = NDArray[np.float64]
 

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..reach.decay import SettledLoop
-from ..reach.flow import Flow
-from ..reach.funnel import Funnel, FunnelBuilder, NoFunnel, NormBall
-from ..reach.tail import Tail
-from .crossing import Missed, Nearest
-from .proof import least_slack
-from .region import Region
-from .samples import sample_powers
-from .verdict import Floats
+from modegraph.certify.crossing import Missed, Nearest
+from modegraph.certify.proof import least_slack
+from modegraph.certify.region import Region
+from modegraph.certify.samples import sample_powers
+from modegraph.certify.verdict import Floats
+from modegraph.reach.decay import SettledLoop
+from modegraph.reach.flow import Flow
+from modegraph.reach.funnel import Funnel, FunnelBuilder, NoFunnel, NormBall
+from modegraph.reach.tail import Tail
 
 BISECTIONS = 10
 """Halvings of the radius at which a target is reached."""

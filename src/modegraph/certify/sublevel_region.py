@@ -13,18 +13,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import monomial_count, monomials
-from ..enclosure.rounding import TINY, UNIT
-from ..errors import ModegraphError
-from ..expression.evaluate import Evaluator
-from ..expression.tape import Tape
-from ..model.sets import Set, Sublevel
-from ..model.sets.level_search import all_outside
-from ..reach.bounds import PolynomialBounds
-from ..reach.framing import generator_box
-from ..reach.pointwise import evaluate_over
-from .region import Region
-from .samples import powers_at, sample_variables
+from modegraph.certify.region import Region
+from modegraph.certify.samples import powers_at, sample_variables
+from modegraph.enclosure.monomials import monomial_count, monomials
+from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.errors import ModegraphError
+from modegraph.expression.evaluate import Evaluator
+from modegraph.expression.tape import Tape
+from modegraph.model.sets import Set, Sublevel
+from modegraph.model.sets.level_search import all_outside
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.framing import generator_box
+from modegraph.reach.pointwise import evaluate_over
 
 Floats = NDArray[np.float64]
 

@@ -12,19 +12,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.intervals import IntervalEvaluator
-from ..enclosure.pairs import affine_centres
-from ..errors import ModegraphError
-from ..expression.derivative import derivative
-from ..expression.scalar import Expr
-from ..expression.tape import compile_tape
-from ..model.class_start import StartClass, class_start
-from ..model.mode import Mode
-from ..model.sets import Ball, Box, Ellipsoid, Set, Zonotope
-from ..model.start import mode_start
-from ..model.target import Target
-from ..reach.class_chart import class_chart, require_same_start
-from .region import Region
+from modegraph.certify.region import Region
+from modegraph.enclosure.intervals import IntervalEvaluator
+from modegraph.enclosure.pairs import affine_centres
+from modegraph.errors import ModegraphError
+from modegraph.expression.derivative import derivative
+from modegraph.expression.scalar import Expr
+from modegraph.expression.tape import compile_tape
+from modegraph.model.class_start import StartClass, class_start
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Ball, Box, Ellipsoid, Set, Zonotope
+from modegraph.model.start import mode_start
+from modegraph.model.target import Target
+from modegraph.reach.class_chart import class_chart, require_same_start
 
 Floats = NDArray[np.float64]
 

@@ -9,16 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import ModegraphError
-from ..model.closed_loop import close_loop, mode_start
-from ..model.mode import Mode
-from ..model.sets import is_subset
-from ..model.target import Target
-from ..reach.compiled import CompiledMode, compile_mode, compile_reset
-from ..reach.flow import Flow, Order
-from ..reach.tail import Tail, TailSearch
-from .approach import approach_of
-from .counterexample import (
+from modegraph.certify.approach import approach_of
+from modegraph.certify.counterexample import (
     FLOAT_STEPS,
     Equilibrium,
     PointRun,
@@ -30,15 +22,23 @@ from .counterexample import (
     scene_of,
     trapped_in,
 )
-from .crossing import Nearest
-from .decision import Decision
-from .evidence import slack_until, width_over_time
-from .exploration import Exploration, Goal
-from .findings import Findings
-from .proof import SwitchProof, certified_check, certified_switch
-from .region import Region
-from .sublevel_region import target_region
-from .verdict import Approach, Floats, Status, Verdict, Witness
+from modegraph.certify.crossing import Nearest
+from modegraph.certify.decision import Decision
+from modegraph.certify.evidence import slack_until, width_over_time
+from modegraph.certify.exploration import Exploration, Goal
+from modegraph.certify.findings import Findings
+from modegraph.certify.proof import SwitchProof, certified_check, certified_switch
+from modegraph.certify.region import Region
+from modegraph.certify.sublevel_region import target_region
+from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Witness
+from modegraph.errors import ModegraphError
+from modegraph.model.closed_loop import close_loop, mode_start
+from modegraph.model.mode import Mode
+from modegraph.model.sets import is_subset
+from modegraph.model.target import Target
+from modegraph.reach.compiled import CompiledMode, compile_mode, compile_reset
+from modegraph.reach.flow import Flow, Order
+from modegraph.reach.tail import Tail, TailSearch
 
 POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""

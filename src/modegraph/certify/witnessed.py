@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.mode import Mode
-from ..model.target import Target
-from ..reach.compiled import compile_mode
-from .approach import approach_of
-from .counterexample import PointRun, scene_of
-from .crossing import Nearest, Reach
-from .unit import POINT_STEPS, TargetSpec, goal_of
-from .verdict import Approach, Floats, Unproved, Witness
+from modegraph.certify.approach import approach_of
+from modegraph.certify.counterexample import PointRun, scene_of
+from modegraph.certify.crossing import Nearest, Reach
+from modegraph.certify.unit import POINT_STEPS, TargetSpec, goal_of
+from modegraph.certify.verdict import Approach, Floats, Unproved, Witness
+from modegraph.model.mode import Mode
+from modegraph.model.target import Target
+from modegraph.reach.compiled import compile_mode
 
 LOOKS = 400
 """Instants looked at, at least, where there is a horizon."""

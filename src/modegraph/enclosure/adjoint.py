@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..expression.ops import ADD, ADDC, COS, EXP, MUL, MULC, RECIP, SIN, SQR, SUB, VAR
-from .jets import PLAIN
-from .polynomial import KERNEL
-from .rounding import TINY, UNIT, UP
+from modegraph.enclosure.jets import PLAIN
+from modegraph.enclosure.polynomial import KERNEL
+from modegraph.enclosure.rounding import TINY, UNIT, UP
+from modegraph.expression.ops import ADD, ADDC, COS, EXP, MUL, MULC, RECIP, SIN, SQR, SUB, VAR
 
 OUT = 8.0 * UNIT
 """Relative allowance for the roundings of one product and one sum of ends."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .exponential import POWERS, exponential_terms
-from .polynomial import KERNEL
-from .rounding import TINY, UNIT, UP
+from modegraph.enclosure.exponential import POWERS, exponential_terms
+from modegraph.enclosure.polynomial import KERNEL
+from modegraph.enclosure.rounding import TINY, UNIT, UP
 
 SET_VARIABLE = -1
 DROPPED = -2

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numba import njit
 
-from ..expression.ops import ATAN, COS, EXP, LOG, SIN
-from .polynomial import KERNEL
-from .rounding import LIBM, UNIT, UP
+from modegraph.enclosure.polynomial import KERNEL
+from modegraph.enclosure.rounding import LIBM, UNIT, UP
+from modegraph.expression.ops import ATAN, COS, EXP, LOG, SIN
 
 
 @njit(**KERNEL)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL
-from .rounding import TINY, UNIT, UP
-from .variational import apply_matrix, chord_distance, matrix_product
+from modegraph.enclosure.polynomial import KERNEL
+from modegraph.enclosure.rounding import TINY, UNIT, UP
+from modegraph.enclosure.variational import apply_matrix, chord_distance, matrix_product
 
 POWERS = 6
 """Powers of Z that are formed, so that their terms cancel as they do in truth."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.ops import (
+from modegraph.expression.ops import (
     ADD,
     ADDC,
     ATAN,
@@ -28,7 +28,7 @@ from ..expression.ops import (
     VAR,
     WHERE,
 )  # fmt: skip
-from ..expression.tape import Tape
+from modegraph.expression.tape import Tape
 
 Floats = NDArray[np.float64]
 Range = tuple[Floats, Floats]

@@ -11,7 +11,9 @@ import math
 import numpy as np
 from numba import njit
 
-from ..expression.ops import (
+from modegraph.enclosure.elementary import taylor_coefficients
+from modegraph.enclosure.polynomial import KERNEL, compose_into, multiply_into
+from modegraph.expression.ops import (
     ADD,
     ADDC,
     ATAN,
@@ -28,8 +30,6 @@ from ..expression.ops import (
     VAR,
     WHERE,
 )
-from .elementary import taylor_coefficients
-from .polynomial import KERNEL, compose_into, multiply_into
 
 PLAIN = 1.0
 TOO_WIDE = 2.0

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModegraphError
-from .rounding import MAX_MONOMIALS
+from modegraph.enclosure.rounding import MAX_MONOMIALS
+from modegraph.errors import ModegraphError
 
 Ints = NDArray[np.int64]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .adjoint import tighten
-from .jets import solve_in_time
-from .polynomial import SHORT
-from .ranges import piece_bound
-from .remainder import coefficient_norms, remainders, wants_another_try
-from .rounding import TINY, UNIT, UP
-from .step import truncate_inputs
-from .variational import chord_distance
+from modegraph.enclosure.adjoint import tighten
+from modegraph.enclosure.jets import solve_in_time
+from modegraph.enclosure.polynomial import SHORT
+from modegraph.enclosure.ranges import piece_bound
+from modegraph.enclosure.remainder import coefficient_norms, remainders, wants_another_try
+from modegraph.enclosure.rounding import TINY, UNIT, UP
+from modegraph.enclosure.step import truncate_inputs
+from modegraph.enclosure.variational import chord_distance
 
 
 @njit(**SHORT)

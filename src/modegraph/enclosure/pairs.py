@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL
-from .rounding import TINY
+from modegraph.enclosure.polynomial import KERNEL
+from modegraph.enclosure.rounding import TINY
 
 ROUNDED = 1e-12
 """More than all roundings of one inequality, relative to the sizes of its terms (a few hundred units)."""

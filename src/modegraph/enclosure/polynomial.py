@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .rounding import UNIT
+from modegraph.enclosure.rounding import UNIT
 
 KERNEL = {"cache": True, "fastmath": False, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 SHORT = {**KERNEL, "nogil": False}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL, ascending
-from .rounding import TINY, UNIT, UP
+from modegraph.enclosure.polynomial import KERNEL, ascending
+from modegraph.enclosure.rounding import TINY, UNIT, UP
 
 MAIN_GENERATORS = 40
 """Generators whose signs are followed through the quadratic terms."""

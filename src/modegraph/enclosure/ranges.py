@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL, SHORT
-from .rounding import TINY, UNIT, UP
+from modegraph.enclosure.polynomial import KERNEL, SHORT
+from modegraph.enclosure.rounding import TINY, UNIT, UP
 
 ODD, EVEN = 1, 2
 """Monomials of degree two and more that range over [-1, 1], and over [0, 1]."""

@@ -12,7 +12,12 @@ import math
 import numpy as np
 from numba import njit
 
-from ..expression.ops import (
+from modegraph.enclosure.elementary import taylor_coefficients, taylor_errors
+from modegraph.enclosure.jets import PLAIN, TOO_WIDE
+from modegraph.enclosure.polynomial import KERNEL, multiply_into
+from modegraph.enclosure.rounding import LIBM, TINY, UNIT, UP
+from modegraph.enclosure.variational import chord_distance
+from modegraph.expression.ops import (
     ADD,
     ADDC,
     ATAN,
@@ -31,11 +36,6 @@ from ..expression.ops import (
     VAR,
     WHERE,
 )
-from .elementary import taylor_coefficients, taylor_errors
-from .jets import PLAIN, TOO_WIDE
-from .polynomial import KERNEL, multiply_into
-from .rounding import LIBM, TINY, UNIT, UP
-from .variational import chord_distance
 
 
 @njit(**KERNEL)

@@ -10,15 +10,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .adjoint import tighten
-from .disturbance import DROPPED, disturbance_bounds, disturbance_columns
-from .exponential import push_columns
-from .jets import solve_in_time
-from .polynomial import KERNEL
-from .quadratic import MAIN_GENERATORS, main_generators, quadratic_bound
-from .remainder import coefficient_norms, remainders, wants_another_try
-from .rounding import TINY, UNIT, UP
-from .variational import (
+from modegraph.enclosure.adjoint import tighten
+from modegraph.enclosure.disturbance import DROPPED, disturbance_bounds, disturbance_columns
+from modegraph.enclosure.exponential import push_columns
+from modegraph.enclosure.jets import solve_in_time
+from modegraph.enclosure.polynomial import KERNEL
+from modegraph.enclosure.quadratic import MAIN_GENERATORS, main_generators, quadratic_bound
+from modegraph.enclosure.remainder import coefficient_norms, remainders, wants_another_try
+from modegraph.enclosure.rounding import TINY, UNIT, UP
+from modegraph.enclosure.variational import (
     advance_generators,
     chord_distance,
     exponential_majorant,

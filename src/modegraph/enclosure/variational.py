@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numba import njit
 
-from .polynomial import KERNEL, ascending, multiply_into
-from .rounding import TINY, UNIT, UP
+from modegraph.enclosure.polynomial import KERNEL, ascending, multiply_into
+from modegraph.enclosure.rounding import TINY, UNIT, UP
 
 
 @njit(**KERNEL)

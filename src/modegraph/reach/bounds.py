@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import Monomials
-from ..enclosure.ranges import EVEN, ODD, piece_bounds, upper_bound
-from ..enclosure.rounding import TINY, UNIT
-from .start import Piece
+from modegraph.enclosure.monomials import Monomials
+from modegraph.enclosure.ranges import EVEN, ODD, piece_bounds, upper_bound
+from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..enclosure.step import JACOBIAN_UNDEFINED, NO_GROWTH_BOUND, UNDEFINED
-from .field import Field
-from .records import Failure
+from modegraph.enclosure.step import JACOBIAN_UNDEFINED, NO_GROWTH_BOUND, UNDEFINED
+from modegraph.reach.field import Field
+from modegraph.reach.records import Failure
 
 
 def breakdown(time: float, status: int, node: int, fld: Field, widest: str) -> Failure:

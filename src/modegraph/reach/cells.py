@@ -7,9 +7,9 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import Monomials
-from ..enclosure.rounding import UNIT
-from .start import Piece
+from modegraph.enclosure.monomials import Monomials
+from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

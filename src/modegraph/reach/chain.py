@@ -9,13 +9,13 @@ from copy import copy
 
 import numpy as np
 
-from .compiled import CompiledMode
-from .cuts import nonlinear_variable
-from .field import Field
-from .flow import LATE_FEEDBACK, RESTART_STEPS, Flow, Order
-from .parallelotope import mode_gap
-from .restart import WIDE_GAP, halved, restarted
-from .start import Piece
+from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.cuts import nonlinear_variable
+from modegraph.reach.field import Field
+from modegraph.reach.flow import LATE_FEEDBACK, RESTART_STEPS, Flow, Order
+from modegraph.reach.parallelotope import mode_gap
+from modegraph.reach.restart import WIDE_GAP, halved, restarted
+from modegraph.reach.start import Piece
 
 
 class Chain:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.intervals import IntervalEvaluator
-from ..enclosure.monomials import Monomials
-from ..enclosure.rounding import UNIT
-from ..errors import ModegraphError
-from ..expression.evaluate import Evaluator
-from ..expression.scalar import Expr
-from ..expression.tape import Tape, compile_tape
-from ..model.class_start import StartClass
-from ..model.sets import Set
-from ..model.sets.parametrised import numbers
-from .field import cover
-from .pointwise import evaluate_over
-from .start import Chart, Piece, ellipsoid_axes
+from modegraph.enclosure.intervals import IntervalEvaluator
+from modegraph.enclosure.monomials import Monomials
+from modegraph.enclosure.rounding import UNIT
+from modegraph.errors import ModegraphError
+from modegraph.expression.evaluate import Evaluator
+from modegraph.expression.scalar import Expr
+from modegraph.expression.tape import Tape, compile_tape
+from modegraph.model.class_start import StartClass
+from modegraph.model.sets import Set
+from modegraph.model.sets.parametrised import numbers
+from modegraph.reach.field import cover
+from modegraph.reach.pointwise import evaluate_over
+from modegraph.reach.start import Chart, Piece, ellipsoid_axes
 
 Floats = NDArray[np.float64]
 

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModegraphError
-from ..expression.evaluate import Evaluator
-from ..expression.tape import Tape, compile_tape
-from ..model.class_start import StartClass, class_start
-from ..model.closed_loop import ClosedLoop, close_loop, mode_start
-from ..model.mode import Mode
-from ..model.sets import Set
-from .class_chart import class_chart
-from .field import Field, Frame, compile_field, disturbance_box
-from .parallelotope import slow_and_fast_axes
-from .start import Piece, whole
+from modegraph.errors import ModegraphError
+from modegraph.expression.evaluate import Evaluator
+from modegraph.expression.tape import Tape, compile_tape
+from modegraph.model.class_start import StartClass, class_start
+from modegraph.model.closed_loop import ClosedLoop, close_loop, mode_start
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Set
+from modegraph.reach.class_chart import class_chart
+from modegraph.reach.field import Field, Frame, compile_field, disturbance_box
+from modegraph.reach.parallelotope import slow_and_fast_axes
+from modegraph.reach.start import Piece, whole
 
 Floats = NDArray[np.float64]
 

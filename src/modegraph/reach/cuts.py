@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .flow import RESTART_SHARE, Flow
-from .restart import filled_share
-from .start import Piece
+from modegraph.reach.flow import RESTART_SHARE, Flow
+from modegraph.reach.restart import filled_share
+from modegraph.reach.start import Piece
 
 EQUAL = 1e-6
 """Shares that differ by less, relatively, are equal."""

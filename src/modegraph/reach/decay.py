@@ -18,12 +18,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import monomial_count, monomials
-from ..enclosure.rounding import TINY, UNIT
-from .field import Field, cover
-from .inverse import near_inverse
-from .pointwise import evaluate_over
-from .quadric import Quadric
+from modegraph.enclosure.monomials import monomial_count, monomials
+from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.reach.field import Field, cover
+from modegraph.reach.inverse import near_inverse
+from modegraph.reach.pointwise import evaluate_over
+from modegraph.reach.quadric import Quadric
 
 Floats = NDArray[np.float64]
 

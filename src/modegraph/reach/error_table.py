@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.disturbance import DROPPED, SET_VARIABLE
-from ..enclosure.monomials import Monomials, monomials
+from modegraph.enclosure.disturbance import DROPPED, SET_VARIABLE
+from modegraph.enclosure.monomials import Monomials, monomials
 
 
 @dataclass(frozen=True)

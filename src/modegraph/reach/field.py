@@ -10,15 +10,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.derivative import derivative
-from ..expression.ops import CONST, LOG, RECIP, VAR, WHERE
-from ..expression.residual import residual
-from ..expression.scalar import Expr, Graph
-from ..expression.simplify import simplify
-from ..expression.tape import Tape, compile_tape
-from ..model.closed_loop import ClosedLoop, Segment
-from ..model.sets.box import Box
-from ..model.sets.exact import inverse, matrix
+from modegraph.expression.derivative import derivative
+from modegraph.expression.ops import CONST, LOG, RECIP, VAR, WHERE
+from modegraph.expression.residual import residual
+from modegraph.expression.scalar import Expr, Graph
+from modegraph.expression.simplify import simplify
+from modegraph.expression.tape import Tape, compile_tape
+from modegraph.model.closed_loop import ClosedLoop, Segment
+from modegraph.model.sets.box import Box
+from modegraph.model.sets.exact import inverse, matrix
 
 SIMPLIFY_SECONDS = 1.0
 """Longest time spent on cancelling terms of one closed loop; then the tape is used as written."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.evaluate import Evaluator
-from .field import Field
+from modegraph.expression.evaluate import Evaluator
+from modegraph.reach.field import Field
 
 Floats = NDArray[np.float64]
 

@@ -8,27 +8,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import Monomials, monomials
-from ..enclosure.observe import observe_step, observed_bounds
-from ..enclosure.rounding import UNIT
-from ..enclosure.step import (
+from modegraph.enclosure.monomials import Monomials, monomials
+from modegraph.enclosure.observe import observe_step, observed_bounds
+from modegraph.enclosure.rounding import UNIT
+from modegraph.enclosure.step import (
     DONE,
     NO_CONTRACTION,
     flow_step,
 )
-from ..expression.tape import Tape
-from .bounds import PolynomialBounds
-from .breakdown import breakdown
-from .class_chart import start_polynomials
-from .error_table import error_table
-from .field import Field
-from .framing import generator_box, into_frame, out_of_frame, thinned
-from .grid import next_instant
-from .passage import Passages
-from .pointwise import evaluate_over, workspace
-from .records import Failure, Order, Step
-from .start import Piece
-from .step_control import MOST_TIME_DEGREE, error_guess, feeding_cap, time_degree
+from modegraph.expression.tape import Tape
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.breakdown import breakdown
+from modegraph.reach.class_chart import start_polynomials
+from modegraph.reach.error_table import error_table
+from modegraph.reach.field import Field
+from modegraph.reach.framing import generator_box, into_frame, out_of_frame, thinned
+from modegraph.reach.grid import next_instant
+from modegraph.reach.passage import Passages
+from modegraph.reach.pointwise import evaluate_over, workspace
+from modegraph.reach.records import Failure, Order, Step
+from modegraph.reach.start import Piece
+from modegraph.reach.step_control import MOST_TIME_DEGREE, error_guess, feeding_cap, time_degree
 
 Floats = NDArray[np.float64]
 

@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..cores import in_parallel, one_core
-from ..errors import ModegraphError
-from ..model.mode import Mode
-from ..model.sets import Box, Set
-from .chain import Chain
-from .compiled import CompiledMode, compile_mode
-from .cuts import nonlinear_variable
-from .field import Field
-from .flow import Order
-from .ladder import class_orders, is_light, orders
-from .looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
-from .restrictor import Restrictor
-from .slices import Slice, Slicer, hull, outline
-from .start import Piece
+from modegraph.cores import in_parallel, one_core
+from modegraph.errors import ModegraphError
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Box, Set
+from modegraph.reach.chain import Chain
+from modegraph.reach.compiled import CompiledMode, compile_mode
+from modegraph.reach.cuts import nonlinear_variable
+from modegraph.reach.field import Field
+from modegraph.reach.flow import Order
+from modegraph.reach.ladder import class_orders, is_light, orders
+from modegraph.reach.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
+from modegraph.reach.restrictor import Restrictor
+from modegraph.reach.slices import Slice, Slicer, hull, outline
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.polynomial import box_of_generators, thin_generators
-from ..enclosure.rounding import UNIT
-from .field import Frame
+from modegraph.enclosure.polynomial import box_of_generators, thin_generators
+from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.field import Frame
 
 Floats = NDArray[np.float64]
 

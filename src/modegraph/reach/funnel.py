@@ -16,14 +16,14 @@ from itertools import dropwhile, takewhile
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import monomials
-from ..enclosure.rounding import TINY, UNIT
-from .bounds import PolynomialBounds
-from .decay import DecayRegion, Norm, SettledLoop
-from .float_loop import FloatLoop
-from .lyapunov import shrinking_ellipsoid
-from .pointwise import evaluate_over
-from .start import Chart, Piece
+from modegraph.enclosure.monomials import monomials
+from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.decay import DecayRegion, Norm, SettledLoop
+from modegraph.reach.float_loop import FloatLoop
+from modegraph.reach.lyapunov import shrinking_ellipsoid
+from modegraph.reach.pointwise import evaluate_over
+from modegraph.reach.start import Chart, Piece
 
 Floats = NDArray[np.float64]
 

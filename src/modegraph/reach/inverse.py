@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
+from modegraph.enclosure.rounding import UNIT
 
 Floats = NDArray[np.float64]
 

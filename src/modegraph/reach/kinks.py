@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expression.evaluate import Evaluator
-from ..expression.ops import RELU
-from .field import Field
+from modegraph.expression.evaluate import Evaluator
+from modegraph.expression.ops import RELU
+from modegraph.reach.field import Field
 
 Floats = NDArray[np.float64]
 

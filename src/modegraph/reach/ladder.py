@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..enclosure.monomials import monomial_count
-from .chain import Chain
-from .compiled import CompiledMode
-from .flow import Order
-from .looseness import is_loose, is_very_loose
-from .start import Piece
+from modegraph.enclosure.monomials import monomial_count
+from modegraph.reach.chain import Chain
+from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.flow import Order
+from modegraph.reach.looseness import is_loose, is_very_loose
+from modegraph.reach.start import Piece
 
 LADDER = ((3, 1), (4, 3), (6, 3), (8, 4), (10, 4))
 """Degrees of p and of the Jacobian flow; higher ones are tried where lower ones are loose or break down."""

@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Chain
-from .class_chart import parameters_of
-from .flow import generator_box
+from modegraph.reach.chain import Chain
+from modegraph.reach.class_chart import parameters_of
+from modegraph.reach.flow import generator_box
 
 Floats = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..expression.ops import CONST, MUL, VAR, WHERE
-from ..expression.tape import Tape
-from .field import Field
+from modegraph.expression.ops import CONST, MUL, VAR, WHERE
+from modegraph.expression.tape import Tape
+from modegraph.reach.field import Field
 
 
 def in_own_time(fld: Field) -> Field | None:

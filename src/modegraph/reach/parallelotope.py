@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
-from .bounds import PolynomialBounds
-from .flow import generator_box
-from .inverse import near_inverse
+from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.flow import generator_box
+from modegraph.reach.inverse import near_inverse
 
 Floats = NDArray[np.float64]
 

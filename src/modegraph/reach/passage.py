@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import monomials
-from ..enclosure.rounding import UNIT
-from ..expression.ops import RELU
-from .field import Field
-from .framing import generator_box
-from .grid import is_exact
-from .kinks import Kinks, Passage
-from .own_time import in_own_time
-from .records import Step
+from modegraph.enclosure.monomials import monomials
+from modegraph.enclosure.rounding import UNIT
+from modegraph.expression.ops import RELU
+from modegraph.reach.field import Field
+from modegraph.reach.framing import generator_box
+from modegraph.reach.grid import is_exact
+from modegraph.reach.kinks import Kinks, Passage
+from modegraph.reach.own_time import in_own_time
+from modegraph.reach.records import Step
 
 if TYPE_CHECKING:
-    from .flow import Flow
+    from modegraph.reach.flow import Flow
 
 Floats = NDArray[np.float64]
 

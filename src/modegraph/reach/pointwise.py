@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.monomials import Monomials
-from ..enclosure.observe import enclose_at
-from ..expression.tape import Tape
+from modegraph.enclosure.monomials import Monomials
+from modegraph.enclosure.observe import enclose_at
+from modegraph.expression.tape import Tape
 
 Floats = NDArray[np.float64]
 

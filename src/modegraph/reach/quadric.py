@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.polynomial import generator_reach
-from ..enclosure.rounding import UNIT
-from .bounds import PolynomialBounds
+from modegraph.enclosure.polynomial import generator_reach
+from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.bounds import PolynomialBounds
 
 Floats = NDArray[np.float64]
 

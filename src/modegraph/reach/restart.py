@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
-from .bounds import PolynomialBounds
-from .field import Field
-from .flow import Flow, Order
-from .framing import generator_box
-from .parallelotope import half_widths, principal_axes, tightest
-from .start import Piece
+from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.field import Field
+from modegraph.reach.flow import Flow, Order
+from modegraph.reach.framing import generator_box
+from modegraph.reach.parallelotope import half_widths, principal_axes, tightest
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

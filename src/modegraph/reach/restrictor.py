@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.class_start import StartClass
-from ..model.mode import Mode
-from ..model.start import mode_start
-from .class_chart import require_same_start
-from .compiled import CompiledMode
-from .flow import Flow
-from .slices import Slice
-from .substitution import Substitution, holds
+from modegraph.model.class_start import StartClass
+from modegraph.model.mode import Mode
+from modegraph.model.start import mode_start
+from modegraph.reach.class_chart import require_same_start
+from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.flow import Flow
+from modegraph.reach.slices import Slice
+from modegraph.reach.substitution import Substitution, holds
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.ranges import linear_bound
-from ..enclosure.rounding import UNIT
-from .flow import Flow, generator_box
+from modegraph.enclosure.ranges import linear_bound
+from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.flow import Flow, generator_box
 
 Floats = NDArray[np.float64]
 

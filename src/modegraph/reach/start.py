@@ -14,17 +14,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import UNIT
-from ..errors import ModegraphError
-from ..expression.tape import Tape
-from ..model.sets.ball import Ball
-from ..model.sets.base import Set
-from ..model.sets.box import Box
-from ..model.sets.ellipsoid import Ellipsoid
-from ..model.sets.polytope import Polytope
-from ..model.sets.sublevel import Sublevel
-from ..model.sets.zonotope import Zonotope
-from .field import cover
+from modegraph.enclosure.rounding import UNIT
+from modegraph.errors import ModegraphError
+from modegraph.expression.tape import Tape
+from modegraph.model.sets.ball import Ball
+from modegraph.model.sets.base import Set
+from modegraph.model.sets.box import Box
+from modegraph.model.sets.ellipsoid import Ellipsoid
+from modegraph.model.sets.polytope import Polytope
+from modegraph.model.sets.sublevel import Sublevel
+from modegraph.model.sets.zonotope import Zonotope
+from modegraph.reach.field import cover
 
 Floats = NDArray[np.float64]
 

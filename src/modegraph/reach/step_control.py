@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .framing import generator_box
-from .start import Piece
+from modegraph.reach.framing import generator_box
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import TINY, UNIT
-from .class_chart import parameters_of, scale_of
-from .flow import Flow
-from .start import Piece
+from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.reach.class_chart import parameters_of, scale_of
+from modegraph.reach.flow import Flow
+from modegraph.reach.start import Piece
 
 Floats = NDArray[np.float64]
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..enclosure.rounding import TINY, UNIT
-from .class_chart import parameters_of, scale_of
-from .field import Field
-from .float_loop import FloatLoop
-from .flow import Flow, Order
-from .parallelotope import half_widths, modal_axes
-from .start import Chart, Piece
+from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.reach.class_chart import parameters_of, scale_of
+from modegraph.reach.field import Field
+from modegraph.reach.float_loop import FloatLoop
+from modegraph.reach.flow import Flow, Order
+from modegraph.reach.parallelotope import half_widths, modal_axes
+from modegraph.reach.start import Chart, Piece
 
 Floats = NDArray[np.float64]
 
