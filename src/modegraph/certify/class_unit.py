@@ -216,7 +216,5 @@ def _tail_order(chain: Chain) -> Order:
 
 def _own_chart(piece: Piece) -> Chart:
     """The chart of a piece for the references and unknown constants that it is for: they do not change."""
-    lo, hi = piece.chart.unknown_lo.copy(), piece.chart.unknown_hi.copy()
-    for i in piece.uncertain.tolist():
-        lo[i], hi[i] = piece.unknown_range(i)
+    lo, hi = piece.unknown_ranges
     return replace(piece.chart, unknown_lo=lo, unknown_hi=hi)

@@ -125,12 +125,9 @@ def _around_one(flow: Flow, fields: Sequence[Field]) -> Piece | None:
     # The products are rounded entry by entry: what counts is that this very M holds the rest.
     if not (half_widths(flow.bounds, nothing, every, M, origin) <= 1.0).all():
         return None
-    old = flow.piece.chart
-    chart = old.around(centre, np.hstack([linear[:, np.sort(kept)], M]), original=False)
-    lo, hi = old.unknown_lo.copy(), old.unknown_hi.copy()
-    for i in flow.piece.uncertain.tolist():
-        # The same variable: an unknown on the scale of its range in this piece.
-        lo[i], hi[i] = flow.piece.unknown_range(i)
+    chart = flow.piece.chart.around(centre, np.hstack([linear[:, np.sort(kept)], M]), original=False)
+    # The same variables: the unknowns on the scale of their ranges in this piece.
+    lo, hi = flow.piece.unknown_ranges
     return Piece.whole(replace(chart, unknown_lo=lo, unknown_hi=hi, tilt=linear[:, free:]))
 
 
@@ -145,9 +142,7 @@ def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> Piece | None:
     M = found[0] * (found[1] * (1.0 + 1e-9))
     if not all((half_widths(bounds, p, G, M, centre) <= 1.0).all() for bounds, p, G in sets):
         return None
-    chart, m = flows[0].piece.chart, flows[0].piece.chart.free
-    lo = np.min([flow.piece.lo[m:] for flow in flows], axis=0)
-    hi = np.max([flow.piece.hi[m:] for flow in flows], axis=0)
-    ones = np.ones(M.shape[1])
-    chart = chart.around(centre, M, original=False)
-    return Piece(chart, np.concatenate([-ones, lo]), np.concatenate([ones, hi]))
+    chart = flows[0].piece.chart.around(centre, M, original=False)
+    # Each piece scales its unknowns to a range of its own: what all hold is known in their units only.
+    ranges = np.array([flow.piece.unknown_ranges for flow in flows])
+    return Piece.whole(replace(chart, unknown_lo=ranges[:, 0].min(axis=0), unknown_hi=ranges[:, 1].max(axis=0)))

@@ -160,6 +160,8 @@ class Piece:
     def unknown_range(self, i: int) -> tuple[float, float]:
         """Interval of unknown i in this piece, rounded outward."""
         lo, hi = float(self.chart.unknown_lo[i]), float(self.chart.unknown_hi[i])
+        if lo == hi:
+            return lo, hi
         k = self.chart.free + int(np.searchsorted(self.uncertain, i))
         a, b = float(self.lo[k]), float(self.hi[k])
         left = lo if a == -1.0 else np.nextafter(lo + 0.5 * (a + 1.0) * (hi - lo), -np.inf)
@@ -168,6 +170,12 @@ class Piece:
         left = lo if a == -1.0 else max(lo, left - slack)
         right = hi if b == 1.0 else min(hi, right + slack)
         return float(left), float(right)
+
+    @cached_property
+    def unknown_ranges(self) -> tuple[Floats, Floats]:
+        """Intervals (lo, hi), each (nd,), of all unknowns in this piece, rounded outward."""
+        ranges = np.array([self.unknown_range(i) for i in range(len(self.chart.unknown_lo))]).reshape(-1, 2)
+        return ranges[:, 0], ranges[:, 1]
 
     @property
     def known(self) -> bool:
