@@ -61,7 +61,7 @@ class Decision:
         following = self._after(flows)
         if following is None:
             return False
-        part = self.exploration.follow([following], flows, found, park=False)
+        part = self.exploration.follow([following], [[flow] for flow in flows], found, park=False)
         missing = [j for j in found.waiting if j not in part.proofs]
         undecided = bool(missing) or (found.waiting_safety is not None and part.safety is None)
         self._finish(found, [part])
@@ -75,7 +75,7 @@ class Decision:
         """Chains that want another restart, together, or in halves where all of them are too much."""
         exploration = self.exploration
         ends = [part.parked[-1] for part in open_chains]
-        before = [flow for part in open_chains for flow in part.parked]
+        before = [part.parked for part in open_chains]
         following = exploration.continued[ends[0]] if len(ends) == 1 else exploration.again(ends, exploration.end())
         if following is None:
             part = Findings(flow=ends[0], last=ends[-1], failure="the reach set cannot be enclosed again")

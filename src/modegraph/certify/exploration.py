@@ -129,10 +129,9 @@ class Exploration:
         last = self.fields[-1]
         if not (last.autonomous and np.isinf(last.end)):
             return None
-        ranges = [piece.unknown_range(i) for i in range(len(piece.chart.unknown_lo))]
-        key = tuple(v for pair in ranges for v in pair)
+        lo, hi = piece.unknown_ranges
+        key = (*lo.tolist(), *hi.tolist())
         if key not in self._funnels:
-            lo, hi = (np.array([pair[side] for pair in ranges]) for side in (0, 1))
             self._funnels[key] = Funnels(SettledLoop(last, self.w_centre, self.w_radius, lo, hi))
         return self._funnels[key]
 
@@ -156,21 +155,21 @@ class Exploration:
         """Go on with a parked flow until it is decided or wants another restart; undo the parking where
         that breaks down: its part of the starts is too large then."""
         flow = found.parked[0]
-        part = self.follow([self.continued[flow]], [flow], found, park=True)
+        part = self.follow([self.continued[flow]], [[flow]], found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
             found.unpark(part.failure or str(part.unproved or "") or filled(part.last))
             return
         self.chains[flow] = part
 
-    def follow(self, flows: list[Flow], before: list[Flow], found: Findings, park: bool) -> Findings:
-        """What flows show that go on from the ends of those before them, of what ``found`` waits for."""
+    def follow(self, flows: list[Flow], before: Sequence[Sequence[Flow]], found: Findings, park: bool) -> Findings:
+        """What flows show that go on from the ends of the chains before them, of what ``found`` waits for."""
         wanted = list(found.waiting)
         safety = found.waiting_safety is not None
         course = self._advance(flows, wanted, safety, self.end(), park=park)
         part = self._findings(flows, wanted, course, safety, before=before)
         if course.parked and proved_instants(flows[-1]) == len(flows[-1].steps):
-            part.parked = [*before, *flows]
+            part.parked = [*(flow for chain in before for flow in chain), *flows]
         return part
 
     def explore(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0) -> Findings:
@@ -392,11 +391,11 @@ class Exploration:
         wanted: Sequence[int],
         course: Course,
         safety: bool,
-        before: Sequence[Flow] = (),
+        before: Sequence[Sequence[Flow]] = (),
     ) -> Findings:
         """What a chain of flows shows; each but the first starts around the end of the one before.
 
-        The first starts around the ends of the flows ``before``, if there are any.
+        The first starts around the ends of the chains ``before``, if there are any.
         """
         flow = flows[-1]
         found = Findings(flow=flows[0], last=flow, tail_reason=course.reason)
@@ -425,15 +424,18 @@ class Exploration:
         return found
 
     def _crossing(
-        self, flows: Sequence[Flow], j: int, sinking: Sinking | None, before: Sequence[Flow] = ()
+        self, flows: Sequence[Flow], j: int, sinking: Sinking | None, before: Sequence[Sequence[Flow]] = ()
     ) -> SwitchProof | Missed:
         goal = self.goals[j]
         best: Missed | None = None
-        slack = [slack_until(f, len(f.steps)) for f in before]
-        seen = [Reach(f, self.horizon, goal.reset).earliest(goal.region, self.plant) for f in before]
+        past = [flow for chain in before for flow in chain]
+        slack = [slack_until(f, len(f.steps)) for f in past]
+        seen = [Reach(f, self.horizon, goal.reset).earliest(goal.region, self.plant) for f in past]
         earliest = min((t for t in seen if t is not None), default=None)
-        # Of several chains (each parked twice) some are ahead of the clock of their common flow.
-        ahead = float(flows[0].times[0]) if len(before) > 2 else 0.0
+        # Chains end at instants of their own; their common flow has the clock of the last, the others are ahead of it.
+        ends = [chain[-1].time for chain in before]
+        begin = float(flows[0].times[0])
+        ahead = 0.0 if all(end == begin for end in ends) else float(np.nextafter(begin - min(ends), np.inf))
         for flow in flows:
             reach = Reach(flow, self.horizon, goal.reset)
             touched = reach.earliest(goal.region, self.plant)
@@ -442,7 +444,7 @@ class Exploration:
                 earliest = touched if earliest is None else min(earliest, touched)
             outcome = find_crossings(reach, goal.region)
             if not isinstance(outcome, Missed):
-                first = max(0.0, min(c.time for c in outcome) - ahead)
+                first = max(0.0, float(np.nextafter(min(c.time for c in outcome) - ahead, -np.inf)))
                 latest = max(c.instant for c in outcome)
                 return SwitchProof(
                     earliest=float(first if earliest is None else min(earliest, first)),
@@ -456,7 +458,7 @@ class Exploration:
                 )
             if best is None or outcome.gauge < best.gauge:
                 first = flow is flows[0] and not before
-                best = outcome if first else replace(outcome, start=(*before, *flows)[0].piece.middle, sampled=False)
+                best = outcome if first else replace(outcome, start=(*past, *flows)[0].piece.middle, sampled=False)
             if proved_instants(flow) < len(flow.steps):
                 break
             slack.append(slack_until(flow, len(flow.steps)))
@@ -472,7 +474,7 @@ class Exploration:
         arrived = float(np.nextafter(sinking.start + arrival.seconds, np.inf))
         spent = float(last.seen_bounds.upper(last.steps[-1].energy) + last.steps[-1].energy_radius)
         return SwitchProof(
-            earliest=max(0.0, sinking.start - ahead) if earliest is None else earliest,
+            earliest=max(0.0, float(np.nextafter(sinking.start - ahead, -np.inf))) if earliest is None else earliest,
             latest=arrived,
             margin=1.0 - arrival.best,
             window=np.inf,
@@ -482,7 +484,9 @@ class Exploration:
             nearest=arrival.nearest,
         )
 
-    def _safety(self, flows: Sequence[Flow], tail: Tail | None, before: Sequence[Flow] = ()) -> SafetyProof | None:
+    def _safety(
+        self, flows: Sequence[Flow], tail: Tail | None, before: Sequence[Sequence[Flow]] = ()
+    ) -> SafetyProof | None:
         flow = flows[-1]
         last = flow.fields[-1]
         if tail is None:
@@ -490,4 +494,4 @@ class Exploration:
                 # A linear loop has a solution for all time, and there is nothing else to prove.
                 return SafetyProof({}, flow.time, np.full(last.outputs, np.inf))
             return None
-        return lasting([*before, *flows], tail)
+        return lasting([*(flow for chain in before for flow in chain), *flows], tail)
