@@ -31,7 +31,8 @@ DEGREE = 3
 MOST_MONOMIALS = 220
 COARSE = 0.1
 """A polynomial enclosure that misses more than this share of the margin is cut."""
-MOST_PARTS = 400
+MOST_PARTS, MOST_ENCLOSURES = 400, 1600
+"""Parts a region is cut into, and enclosures computed for them in all."""
 MOST_CELLS = 60000
 """Cells the ellipsoid is cut into, in all, to bound one rate."""
 
@@ -150,6 +151,7 @@ class DecayRegion:
 
     def __init__(self, loop: SettledLoop, norm: Norm, radius: float) -> None:
         self.loop, self.norm, self.radius = loop, norm, radius
+        self.enclosures = 1
         n = loop.fld.states
         self.parts: list[Slopes | None] = [loop.slopes(norm, radius, -np.ones(n), np.ones(n))]
 
@@ -165,11 +167,15 @@ class DecayRegion:
         left = self.parts
         while left:
             part = left.pop()
-            if part is None or budget <= 0 or len(settled) + len(left) > MOST_PARTS:
+            spent = budget <= 0 or self.enclosures > MOST_ENCLOSURES or len(settled) + len(left) > MOST_PARTS
+            if part is None or spent:
                 self.parts = [*settled, *left, part]
                 return False
             if part.coarse(M):
-                left += [self.loop.slopes(self.norm, self.radius, lo, hi) for lo, hi in part.halves()]
+                # At a kink no part gets less coarse: the work is counted, the depth is not.
+                halves = [self.loop.slopes(self.norm, self.radius, lo, hi) for lo, hi in part.halves()]
+                self.enclosures += len(halves)
+                left += halves
                 continue
             settled.append(part)
             used = part.negative(M, budget)
