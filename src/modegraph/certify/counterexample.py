@@ -22,6 +22,7 @@ from modegraph.model.sets import Box, Set, is_subset
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.field import Field
 from modegraph.reach.flow import Flow, Order
+from modegraph.reach.inverse import near_inverse
 from modegraph.reach.start import point
 
 Floats = NDArray[np.float64]
@@ -247,7 +248,11 @@ def enclose_equilibrium(scene: Scene, guess: Floats, w: Floats, d: Floats) -> Eq
     else:
         return None
     flow = Flow(scene.fields, point(x, d), w, np.zeros(len(w)), POINT_ORDER, names=scene.names)
-    Y = np.linalg.inv(slopes(inputs(x)[:, None])[: n * n, 0].reshape(n, n))
+    # Where Newton's method ends on a kink the slope may be another than that of its last step: singular, or NaN.
+    near = near_inverse(slopes(inputs(x)[:, None])[: n * n, 0].reshape(n, n))
+    if near is None or not np.isfinite(near[0]).all():
+        return None
+    Y = near[0]
     at = inputs(x)[:, None] * np.ones((1, flow.table.size))
     at[:, 1:] = 0.0
     value, off, _ = flow.evaluate(fld.rates, at, np.zeros(len(at)))
