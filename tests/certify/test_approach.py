@@ -7,14 +7,14 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.approach import approach_of, face_in_words
-from modegraph.certify.crossing import Missed, Reach, find_crossings
-from modegraph.certify.region import Region
-from modegraph.certify.sublevel_region import target_region
+from modegraph.certify.counterexamples.witnessed import witnessed
+from modegraph.certify.switching.common_time import Missed, Reach, find_crossings
+from modegraph.certify.targets.region import Region
+from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Approach, Witness
-from modegraph.certify.witnessed import witnessed
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow, Order
 
 NAMES = ("angle", "rate")
 

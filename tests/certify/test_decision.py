@@ -16,7 +16,7 @@ from modegraph.certify.decision import Decision
 from modegraph.certify.exploration import Exploration
 from modegraph.certify.findings import Findings
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
-from modegraph.reach.flow import Flow
+from modegraph.reach.flow.flow import Flow
 
 ARM = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "two_link_arm.py"))
 ANGLE, RATE = 0.2, 0.4

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.crossing import Missed
 from modegraph.certify.exploration import Course, Exploration, Goal
 from modegraph.certify.proof import SwitchProof
-from modegraph.certify.region import Region
-from modegraph.certify.sinking import Sinking
+from modegraph.certify.switching.common_time import Missed
+from modegraph.certify.switching.funnel import Sinking
+from modegraph.certify.targets.region import Region
 from modegraph.certify.unit import exploration_of
 from modegraph.reach.compiled import CompiledMode, compile_mode
-from modegraph.reach.decay import SettledLoop
-from modegraph.reach.flow import Flow, Order
-from modegraph.reach.funnel import Funnel, FunnelBuilder
+from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.tail.decay import SettledLoop
+from modegraph.reach.tail.funnel import Funnel, FunnelBuilder
 
 LIMIT = 0.5
 TARGET = Region(mg.Ball([0.0], 0.01))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modegraph.certify.crossing import Missed
 from modegraph.certify.findings import Findings, merge
 from modegraph.certify.proof import SafetyProof, SwitchProof
+from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.verdict import Unproved
 
 MISSED = Missed(2.0, 1.0, True, np.zeros(1))

@@ -7,7 +7,7 @@ import modegraph as mg
 from modegraph.enclosure.monomials import monomials
 from modegraph.enclosure.observe import observed_bounds
 from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.start import whole
+from modegraph.reach.start.piece import whole
 
 TABLE = monomials((1, 1), 2)
 BOUNDS = PolynomialBounds(whole(mg.Box([-1.0, -1.0], [1.0, 1.0]), []), TABLE, TABLE.size)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import modegraph as mg
 from modegraph.enclosure.step import DONE
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow, Order
 
 RATES: dict[str, tuple[Any, int]] = {
     "square": (lambda x: [x[0] ** 2], 1),

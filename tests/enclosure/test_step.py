@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import modegraph as mg
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow, Order
 
 MATRICES = {
     "stable": [[-1.0, 0.5], [-2.0, -3.0]],

@@ -269,7 +269,7 @@ KERNEL_FAULTS = (
         "enclosure/observe.py",
         "            top = max(top, piece_bound(ends[side, i], 1.0, kinds, linear, radius, middle, rounding))",
         "            top = max(top, piece_bound(ends[0, i], 1.0, kinds, linear, radius, middle, rounding))",
-        ("tests/reach/test_flow.py", "tests/reach/test_flowpipe.py"),
+        ("tests/reach/flow/test_flow.py", "tests/reach/test_flowpipe.py"),
     ),
     Fault(
         "generators reach as far as their first coefficient",
@@ -339,6 +339,6 @@ KERNEL_FAULTS = (
         "enclosure/observe.py",
         "slack[i, 0] = (bend + RQ[o] + rounding) * UP + TINY",
         "slack[i, 0] = (RQ[o] + rounding) * UP + TINY",
-        ("tests/reach/test_flow.py",),
+        ("tests/reach/flow/test_flow.py",),
     ),
 )

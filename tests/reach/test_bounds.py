@@ -10,7 +10,7 @@ import pytest
 import modegraph as mg
 from modegraph.enclosure.monomials import monomials
 from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.start import whole
+from modegraph.reach.start.piece import whole
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-150, 1e-163, 1e-200, 1e-300])

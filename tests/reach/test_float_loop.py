@@ -9,7 +9,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.reach.float_loop import FloatLoop
-from tests.reach.test_decay import settled
+from tests.reach.tail.test_decay import settled
 
 
 def float_loop(field: Any, n: int, w: mg.Box | None = None, unknowns: Any = None) -> FloatLoop:

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 import modegraph as mg
 from modegraph.reach import flowpipe as module
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.cuts import nonlinear_variable
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.cover.cuts import nonlinear_variable
+from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.flowpipe import Flowpipe
 
 VDP_SPREAD = np.array([0.104, 0.436])

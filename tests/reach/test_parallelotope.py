@@ -15,7 +15,7 @@ from modegraph.reach.parallelotope import (
     slow_and_fast_axes,
     tightest,
 )
-from modegraph.reach.start import whole
+from modegraph.reach.start.piece import whole
 
 TABLE = monomials((1, 1), 2)
 BOUNDS = PolynomialBounds(whole(mg.Box([0, 0], [1, 1]), []), TABLE, TABLE.size)

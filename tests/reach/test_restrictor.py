@@ -9,7 +9,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow, Order
 from tests.soundness.families import follower, oscillator, pushed
 
 LOOP = mg.System(lambda x, u: np.array([x[1], u[0]]), states="x v", inputs="u")

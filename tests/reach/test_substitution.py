@@ -7,11 +7,11 @@ from fractions import Fraction
 import numpy as np
 
 import modegraph as mg
-from modegraph.reach.chain import Chain
-from modegraph.reach.class_chart import parameters_of, scale_of
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
-from modegraph.reach.start import Piece
+from modegraph.reach.cover.chain import Chain
+from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.start.class_chart import parameters_of, scale_of
+from modegraph.reach.start.piece import Piece
 from modegraph.reach.substitution import Substitution, holds
 from tests.soundness.families import oscillator
 

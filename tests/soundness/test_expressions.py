@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import modegraph as mg
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow, Order
 
 Tree = tuple[Any, ...]
 CONSTANTS = [0.0, -0.0, 5e-324, -1e-310, 2.2250738585072014e-308, 1e-17, 1 / 3, 0.5, 1.0, -2.0, 3.0, 1e8, -1e150, 1e300]

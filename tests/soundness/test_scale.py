@@ -14,7 +14,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.reach.compiled import compile_mode
-from modegraph.reach.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow, Order
 from tests.soundness.batch import Runs, runs
 from tests.soundness.plants import KINDS, PUSHES, UNTIL, Plant, plant
 

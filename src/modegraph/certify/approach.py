@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modegraph.certify.crossing import Nearest
-from modegraph.certify.region import Region
+from modegraph.certify.switching.common_time import Nearest
+from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Approach, Floats
 from modegraph.model.sets import Ball, Ellipsoid, Sublevel
-from modegraph.reach.framing import generator_box
+from modegraph.reach.flow.framing import generator_box
 
 
 def approach_of(nearest: Nearest | None, region: Region, names: Sequence[str]) -> Approach | None:

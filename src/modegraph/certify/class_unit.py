@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modegraph.certify.crossing import proved_instants
 from modegraph.certify.evidence import lasting, proved, proved_until, sampled_violation, slack_until, width_over_time
 from modegraph.certify.proof import SafetyProof, certified_check, least_slack
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
-from modegraph.certify.target_class import TargetClass, target_class
+from modegraph.certify.switching.common_time import proved_instants
+from modegraph.certify.targets.family import TargetClass, target_class
 from modegraph.certify.unit import TargetSpec
 from modegraph.certify.verdict import Floats, Status, Verdict
 from modegraph.errors import ModegraphError
@@ -23,14 +23,14 @@ from modegraph.expression.simplify import simplify
 from modegraph.model.class_start import StartClass, returned_start
 from modegraph.model.mode import Mode
 from modegraph.model.sets.parametrised import ParametrisedSet
-from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import CompiledMode, compile_mode
-from modegraph.reach.cuts import nonlinear_variable
-from modegraph.reach.flow import Order
+from modegraph.reach.cover.chain import Chain
+from modegraph.reach.cover.cuts import nonlinear_variable
+from modegraph.reach.cover.ladder import CURVED
+from modegraph.reach.flow.flow import Order
 from modegraph.reach.flowpipe import DEFAULT_HORIZON, Cutting
-from modegraph.reach.ladder import CURVED
-from modegraph.reach.start import Chart, Piece
-from modegraph.reach.tail import Tail, TailFailure, TailSearch
+from modegraph.reach.start.piece import Chart, Piece
+from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
 
 MOST_PARTS = 32
 LEAST_DEGREE, MOST_MONOMIALS = 3, 400

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from modegraph.certify.exploration import Exploration
 from modegraph.certify.findings import Findings, settle
 from modegraph.certify.proof import safe_together, together
-from modegraph.reach.flow import Flow
-from modegraph.reach.start import Piece
+from modegraph.reach.flow.flow import Flow
+from modegraph.reach.start.piece import Piece
 
 
 class Decision:

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.crossing import proved_instants
 from modegraph.certify.proof import SafetyProof, least_slack
 from modegraph.certify.samples import sample_powers
+from modegraph.certify.switching.common_time import proved_instants
 from modegraph.certify.verdict import Unproved, Widths
 from modegraph.expression.evaluate import Evaluator
-from modegraph.reach.chain import Chain
-from modegraph.reach.flow import Flow
-from modegraph.reach.framing import generator_box
-from modegraph.reach.tail import Tail
+from modegraph.reach.cover.chain import Chain
+from modegraph.reach.flow.flow import Flow
+from modegraph.reach.flow.framing import generator_box
+from modegraph.reach.tail.box import Tail
 
 Floats = NDArray[np.float64]
 

@@ -11,24 +11,24 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.crossing import Missed, Reach, find_crossings, proved_instants, widest_variable
 from modegraph.certify.evidence import lasting, sampled_violation, set_size, slack_until, unproved
 from modegraph.certify.findings import Findings, better, filled, merge, too_wide
 from modegraph.certify.proof import SafetyProof, SwitchProof, least_slack
-from modegraph.certify.region import Region
-from modegraph.certify.sinking import Arrival, Funnels, Sinking
+from modegraph.certify.switching.common_time import Missed, Reach, find_crossings, proved_instants, widest_variable
+from modegraph.certify.switching.funnel import Arrival, Funnels, Sinking
+from modegraph.certify.targets.region import Region
 from modegraph.cores import in_parallel
 from modegraph.enclosure.monomials import monomial_count
 from modegraph.expression.tape import Tape
-from modegraph.reach.cuts import nonlinear_variable, parts_of_refused
-from modegraph.reach.decay import SettledLoop
+from modegraph.reach.cover.cuts import nonlinear_variable, parts_of_refused
+from modegraph.reach.cover.restart import WIDE_GAP, filled_share, restarted
 from modegraph.reach.field import Field
-from modegraph.reach.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
-from modegraph.reach.funnel import NoFunnel
+from modegraph.reach.flow.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
 from modegraph.reach.parallelotope import mode_gap
-from modegraph.reach.restart import WIDE_GAP, filled_share, restarted
-from modegraph.reach.start import Piece
-from modegraph.reach.tail import Tail, TailSearch
+from modegraph.reach.start.piece import Piece
+from modegraph.reach.tail.box import Tail, TailSearch
+from modegraph.reach.tail.decay import SettledLoop
+from modegraph.reach.tail.funnel import NoFunnel
 
 Floats = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from modegraph.certify.crossing import Missed
 from modegraph.certify.proof import SafetyProof, SwitchProof, safe_together, together
+from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.verdict import Unproved
-from modegraph.reach.flow import Flow
+from modegraph.reach.flow.flow import Flow
 
 
 @dataclass

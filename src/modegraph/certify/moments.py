@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.crossing import proved_instants
-from modegraph.certify.target_class import TargetClass
+from modegraph.certify.switching.common_time import proved_instants
+from modegraph.certify.targets.family import TargetClass
 from modegraph.enclosure.rounding import UNIT
-from modegraph.reach.class_chart import parameters_of, scale_of
-from modegraph.reach.flow import Flow
+from modegraph.reach.flow.flow import Flow
 from modegraph.reach.quadric import Quadric, generator_sizes
+from modegraph.reach.start.class_chart import parameters_of, scale_of
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modegraph.certify.crossing import Nearest
+from modegraph.certify.switching.common_time import Nearest
 from modegraph.certify.verdict import Floats, Status, Verdict
 
 

@@ -13,11 +13,11 @@ from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.evidence import proved
 from modegraph.certify.moments import moments_of
 from modegraph.certify.relation import Part, Relation, whole_relation
-from modegraph.certify.target_class import TargetClass
+from modegraph.certify.targets.family import TargetClass
 from modegraph.model.sets import Box
-from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import CompiledMode
-from modegraph.reach.cuts import nonlinear_variable
+from modegraph.reach.cover.chain import Chain
+from modegraph.reach.cover.cuts import nonlinear_variable
 
 Floats = NDArray[np.float64]
 

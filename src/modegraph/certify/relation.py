@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.moments import Moments
-from modegraph.certify.target_class import TargetClass
+from modegraph.certify.targets.family import TargetClass
 from modegraph.enclosure.pairs import ROUNDED, first_crossings, part_gauges
 from modegraph.model.sets import Box
 

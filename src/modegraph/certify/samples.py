@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.reach.start import Piece
+from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]
 

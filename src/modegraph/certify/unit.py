@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from modegraph.certify.approach import approach_of
-from modegraph.certify.counterexample import (
+from modegraph.certify.counterexamples.trajectory import (
     FLOAT_STEPS,
     Equilibrium,
     PointRun,
@@ -22,14 +22,14 @@ from modegraph.certify.counterexample import (
     scene_of,
     trapped_in,
 )
-from modegraph.certify.crossing import Nearest
 from modegraph.certify.decision import Decision
 from modegraph.certify.evidence import slack_until, width_over_time
 from modegraph.certify.exploration import Exploration, Goal
 from modegraph.certify.findings import Findings
 from modegraph.certify.proof import SwitchProof, certified_check, certified_switch
-from modegraph.certify.region import Region
-from modegraph.certify.sublevel_region import target_region
+from modegraph.certify.switching.common_time import Nearest
+from modegraph.certify.targets.region import Region
+from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Witness
 from modegraph.errors import ModegraphError
 from modegraph.model.closed_loop import close_loop, mode_start
@@ -37,8 +37,8 @@ from modegraph.model.mode import Mode
 from modegraph.model.sets import is_subset
 from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode, compile_mode, compile_reset
-from modegraph.reach.flow import Flow, Order
-from modegraph.reach.tail import Tail, TailSearch
+from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.tail.box import Tail, TailSearch
 
 POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""

@@ -13,12 +13,12 @@ from modegraph.certify.moments import at_state
 from modegraph.certify.proof import SwitchProof, certified_switch
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.relation import Part, Relation
-from modegraph.certify.target_class import target_class
+from modegraph.certify.targets.family import target_class
 from modegraph.certify.verdict import Status, Verdict, Witness
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box
 from modegraph.model.target import Target
-from modegraph.reach.start import Floats
+from modegraph.reach.start.piece import Floats
 
 Key = tuple[str, int]
 """A mode and the position of a reference in its finite class; 0 for a continuous class or a Target."""

@@ -8,8 +8,8 @@ from dataclasses import replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
+from modegraph.certify.counterexamples.witnessed import witnessed
 from modegraph.certify.verdict import Approach, Status, Unproved, Verdict
-from modegraph.certify.witnessed import witnessed
 from modegraph.errors import ModegraphError
 from modegraph.graph.explanation import Blocking, Explanation, explanation_text
 from modegraph.graph.pair import Pair

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from modegraph.certify.least import Least, Strides, least, strides
 from modegraph.certify.moments import at_state
 from modegraph.certify.relation import Part, Relation
-from modegraph.certify.target_class import target_class
+from modegraph.certify.targets.family import target_class
 from modegraph.certify.verdict import Status
 from modegraph.errors import ModegraphError
 from modegraph.plan.objectives import Objective

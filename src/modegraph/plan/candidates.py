@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.relation import Relation
-from modegraph.certify.target_class import target_class
+from modegraph.certify.targets.family import target_class
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box

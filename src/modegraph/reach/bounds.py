@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from modegraph.enclosure.monomials import Monomials
 from modegraph.enclosure.ranges import EVEN, ODD, piece_bounds, upper_bound
 from modegraph.enclosure.rounding import TINY, UNIT
-from modegraph.reach.start import Piece
+from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from modegraph.model.class_start import StartClass, class_start
 from modegraph.model.closed_loop import ClosedLoop, close_loop, mode_start
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Set
-from modegraph.reach.class_chart import class_chart
 from modegraph.reach.field import Field, Frame, compile_field, disturbance_box
 from modegraph.reach.parallelotope import slow_and_fast_axes
-from modegraph.reach.start import Piece, whole
+from modegraph.reach.start.class_chart import class_chart
+from modegraph.reach.start.piece import Piece, whole
 
 Floats = NDArray[np.float64]
 

@@ -17,16 +17,16 @@ from modegraph.cores import in_parallel, one_core
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box, Set
-from modegraph.reach.chain import Chain
 from modegraph.reach.compiled import CompiledMode, compile_mode
-from modegraph.reach.cuts import nonlinear_variable
+from modegraph.reach.cover.chain import Chain
+from modegraph.reach.cover.cuts import nonlinear_variable
+from modegraph.reach.cover.ladder import class_orders, is_light, orders
+from modegraph.reach.cover.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
 from modegraph.reach.field import Field
-from modegraph.reach.flow import Order
-from modegraph.reach.ladder import class_orders, is_light, orders
-from modegraph.reach.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
+from modegraph.reach.flow.flow import Order
 from modegraph.reach.restrictor import Restrictor
 from modegraph.reach.slices import Slice, Slicer, hull, outline
-from modegraph.reach.start import Piece
+from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]
 

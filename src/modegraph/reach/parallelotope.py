@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import UNIT
 from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.flow import generator_box
+from modegraph.reach.flow.flow import generator_box
 from modegraph.reach.inverse import near_inverse
 
 Floats = NDArray[np.float64]

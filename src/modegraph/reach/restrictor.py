@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from modegraph.model.class_start import StartClass
 from modegraph.model.mode import Mode
 from modegraph.model.start import mode_start
-from modegraph.reach.class_chart import require_same_start
 from modegraph.reach.compiled import CompiledMode
-from modegraph.reach.flow import Flow
+from modegraph.reach.flow.flow import Flow
 from modegraph.reach.slices import Slice
+from modegraph.reach.start.class_chart import require_same_start
 from modegraph.reach.substitution import Substitution, holds
 
 Floats = NDArray[np.float64]

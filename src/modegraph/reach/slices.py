@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from modegraph.enclosure.ranges import linear_bound
 from modegraph.enclosure.rounding import UNIT
-from modegraph.reach.flow import Flow, generator_box
+from modegraph.reach.flow.flow import Flow, generator_box
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import TINY, UNIT
-from modegraph.reach.class_chart import parameters_of, scale_of
-from modegraph.reach.flow import Flow
-from modegraph.reach.start import Piece
+from modegraph.reach.flow.flow import Flow
+from modegraph.reach.start.class_chart import parameters_of, scale_of
+from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]
 
