@@ -13,6 +13,7 @@ from modegraph.certify.targets.region import Region
 from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Approach, Witness
+from modegraph.deadline import NEVER
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.flow.flow import Flow, Order
 
@@ -89,7 +90,7 @@ def test_the_worst_start_is_a_start() -> None:
     mode = turning()
     target = mg.Target("middle", mg.Box([0.95, -0.05], [1.05, 0.05]))
     spec = TargetSpec(target.name, None, target)
-    found = certify_unit(mode, None, [spec], horizon=3.0, deadline=np.inf, switches_only=True)
+    found = certify_unit(mode, None, [spec], horizon=3.0, deadline=NEVER, switches_only=True)
     closest = found.verdicts[0].closest
     assert closest is not None
     assert closest.start is not None
@@ -104,7 +105,7 @@ def test_the_trajectory_of_a_witness() -> None:
     mode, target = turning(), mg.Target("left", mg.Box([0.0, -1.0], [0.8, 1.0]))
     witness = Witness(np.array([1.1, 0.0]), None, {}, 5.0, "horizon")
     spec = TargetSpec("left", None, target)
-    closest, breach = witnessed(mode, None, witness, spec, horizon=5.0, deadline=np.inf)
+    closest, breach = witnessed(mode, None, witness, spec, horizon=5.0, deadline=NEVER)
     assert breach is None
     assert closest is not None
     assert closest.time == pytest.approx(np.pi, abs=0.01)

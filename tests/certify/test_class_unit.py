@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import modegraph as mg
 from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec
+from modegraph.deadline import Deadline
 from tests.certify.class_graphs import double_integrators, one_integrator
 
 SQUARE = mg.Box([-1.0, -1.0], [1.0, 1.0])
@@ -19,7 +19,7 @@ SQUARE = mg.Box([-1.0, -1.0], [1.0, 1.0])
 
 def related(mode: mg.Mode, targets: list[Any], seconds: float = 60.0) -> Any:
     specs = [TargetSpec(t.name, None, t) for t in targets]
-    deadline = time.monotonic() + seconds
+    deadline = Deadline(seconds)
     return relate(mode, None, specs, horizon=6.0, deadline=deadline, progress=lambda text: None)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import runpy
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,12 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.decision import Decision
+from modegraph.certify import course, decision
 from modegraph.certify.exploration import Exploration
 from modegraph.certify.findings import Findings
+from modegraph.certify.question import Question
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
+from modegraph.deadline import NEVER, Deadline
 from modegraph.reach.flow.flow import Flow
 
 ARM = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "two_link_arm.py"))
@@ -28,19 +29,20 @@ def decided() -> UnitResult:
     source = ARM["mode"]("q6", ARM["wide"], mg.setpoint(at), ANGLE, RATE)
     target = next(m for m in ARM["modes"] if m.name == "q7")
     return certify_unit(
-        source, at, [TargetSpec("q7", at, target)], horizon=10.0, deadline=time.monotonic() + 120.0, progress=None
+        source, at, [TargetSpec("q7", at, target)], horizon=10.0, deadline=Deadline(120.0), progress=None
     )
 
 
 def watched(monkeypatch: pytest.MonkeyPatch, together: bool) -> list[int]:
     """Numbers of flows that were enclosed at once; without ``together`` no two ever are."""
-    real, seen = Exploration.again, []
+    real, seen = course.again, []
 
-    def again(self: Exploration, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
+    def again(question: Question, last: Sequence[Flow], first: bool, common: bool) -> Flow | None:
         seen.append(len(last))
-        return real(self, last, end, first) if together or len(last) == 1 else None
+        return real(question, last, first, common) if together or len(last) == 1 else None
 
-    monkeypatch.setattr(Exploration, "again", again)
+    monkeypatch.setattr(course, "again", again)
+    monkeypatch.setattr(decision, "again", again)
     return seen
 
 
@@ -59,11 +61,11 @@ def test_what_waits_is_decided_together_or_alone(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_common_flow_begins_at_the_latest_of_the_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    real: Any = Exploration.again
+    real: Any = course.again
     instants: list[tuple[float, float, float]] = []
 
-    def again(self: Exploration, last: Sequence[Flow], end: float, first: bool = False) -> Flow | None:
-        following: Flow | None = real(self, last, end, first)
+    def again(question: Question, last: Sequence[Flow], first: bool, common: bool) -> Flow | None:
+        following: Flow | None = real(question, last, first, common)
         if len(last) > 1 and following is not None:
             times = [flow.time for flow in last]
             instants.append((min(times), max(times), float(following.times[0])))
@@ -78,37 +80,37 @@ def test_a_common_flow_begins_at_the_latest_of_the_ends(monkeypatch: pytest.Monk
                 assert (hi + z - 1e-9 <= above + y).all()
         return following
 
-    monkeypatch.setattr(Exploration, "again", again)
+    monkeypatch.setattr(decision, "again", again)
     decided()
     assert instants
     for first, latest, begin in instants:
         assert first < latest == begin
 
 
-def test_what_the_common_flow_proves_is_kept_when_the_parts_go_on_alone() -> None:
-    asked: list[tuple[list[int], bool]] = []
+def test_what_the_common_flow_proves_is_kept_when_the_parts_go_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[list[int], bool, bool]] = []
     proof, lasting, late = object(), object(), object()
 
-    class Once:
-        """An exploration of which only the second run, each part alone, decides goal 1."""
+    def explore(self: Exploration, piece: Any, wanted: Sequence[int], safety: bool) -> Findings:
+        """Only the second run, each part alone, decides goal 1."""
+        asked.append((list(wanted), safety, self.common))
+        found: Any = Findings()
+        if not self.common:
+            found.proofs[1] = late
+        return found
 
-        common, parts, deadline = True, 7, float("inf")
+    def all_at_once(self: Any, found: Any) -> bool:
+        found.proofs[0], found.safety = proof, lasting
+        return False
 
-        def explore(self, piece: Any, wanted: Sequence[int], safety: bool) -> Findings:
-            asked.append((list(wanted), safety))
-            found: Any = Findings()
-            if not self.common:
-                found.proofs[1] = late
-            return found
+    monkeypatch.setattr(Exploration, "explore", explore)
+    monkeypatch.setattr(decision._Continuation, "all_at_once", all_at_once)
 
-    class Half(Decision):
-        def _all_at_once(self, found: Any) -> bool:
-            found.proofs[0], found.safety = proof, lasting
-            return False
+    class Asked:
+        autonomous, deadline = True, NEVER
 
-    exploration: Any = Once()
-    found: Any = Half(exploration).decide(None, [0, 1, 2])  # type: ignore[arg-type]
-    assert asked == [([0, 1, 2], True), ([1, 2], False)]
-    assert (exploration.common, exploration.parts) == (False, 0)
+    question: Any = Asked()
+    found: Any = decision.decide(question, None, [0, 1, 2])  # type: ignore[arg-type]
+    assert asked == [([0, 1, 2], True, True), ([1, 2], False, False)]
     assert found.proofs == {0: proof, 1: late}
     assert found.safety is lasting

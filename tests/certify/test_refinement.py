@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 import modegraph as mg
 from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec
+from modegraph.deadline import Deadline
 
 
 def pendulum(size: float) -> mg.Mode:
@@ -23,12 +22,11 @@ def pendulum(size: float) -> mg.Mode:
     )  # fmt: skip
 
 
-def relation(seconds: float) -> Relation:
+def relation(cuts: int) -> Relation:
     modes = [pendulum(0.25), pendulum(0.12)]
     specs = [TargetSpec(name=mode.name, p=None, mode=mode) for mode in modes]
     result = relate(
-        modes[0], None, specs, horizon=5.0, deadline=time.monotonic() + seconds, progress=lambda text: None,
-        thorough=seconds > 1.0,
+        modes[0], None, specs, horizon=5.0, deadline=Deadline(120.0), progress=lambda text: None, cuts=cuts
     )  # fmt: skip
     found = result.relations[1]
     assert isinstance(found, Relation)
@@ -36,7 +34,7 @@ def relation(seconds: float) -> Relation:
 
 
 def test_undecided_pairs_become_fewer() -> None:
-    coarse, fine = relation(1e-3), relation(60.0)
+    coarse, fine = relation(0), relation(60)
     assert len(fine.parts) > len(coarse.parts)
     rng = np.random.default_rng(2)
     source = rng.uniform(-2.0, 2.0, (6000, 1))

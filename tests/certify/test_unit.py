@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 import modegraph as mg
 from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Status, Verdict
+from modegraph.deadline import Deadline
 
 C, R, U = Status.CERTIFIED, Status.REFUTED, Status.UNDECIDED
 
@@ -23,9 +23,7 @@ def mode(start: Any, dynamics: Any = None, w: Any = None, **more: Any) -> mg.Mod
 
 def unit(source: mg.Mode, *sets: Any, horizon: float | None = None) -> tuple[list[Verdict], Verdict]:
     targets = [TargetSpec(f"t{k}", None, mg.Target(f"t{k}", s)) for k, s in enumerate(sets)]
-    result = certify_unit(
-        source, source.reference.parameters()[0], targets, horizon=horizon, deadline=time.monotonic() + 20
-    )
+    result = certify_unit(source, source.reference.parameters()[0], targets, horizon=horizon, deadline=Deadline(20.0))
     return result.verdicts, result.check
 
 

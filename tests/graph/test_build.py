@@ -9,6 +9,7 @@ import pytest
 
 from modegraph.certify.unit import UnitResult
 from modegraph.certify.verdict import Status, Verdict
+from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph import build as build_module
 from modegraph.graph.build import build
@@ -39,9 +40,9 @@ def everything(mode: Any, p: Any, targets: Any, **_: Any) -> UnitResult:
 def test_units_targets_and_their_place_in_the_graph(engine: Engine) -> None:
     asked = []
 
-    def fake(mode: Any, p: Any, targets: Any, *, horizon: Any, deadline: float, progress: Any) -> UnitResult:
+    def fake(mode: Any, p: Any, targets: Any, *, horizon: Any, deadline: Deadline, progress: Any) -> UnitResult:
         asked.append((mode.name, float(p[0]), [(t.name, None if t.p is None else float(t.p[0])) for t in targets]))
-        assert deadline > time.monotonic()
+        assert not deadline.is_over
         verdicts = [Verdict(Status.UNDECIDED, f"{mode.name}{p} to {t.name}{t.p}", horizon=horizon) for t in targets]
         return UnitResult(verdicts=verdicts, check=Verdict(Status.CERTIFIED, f"check {mode.name}{p}"))
 
@@ -98,8 +99,8 @@ def test_a_wrong_model_is_an_error(engine: Engine) -> None:
 
 
 def test_the_budget_ends(engine: Engine) -> None:
-    def fake(mode: Any, p: Any, targets: Any, *, deadline: float, **_: Any) -> UnitResult:
-        time.sleep(max(0.0, deadline - time.monotonic()))
+    def fake(mode: Any, p: Any, targets: Any, *, deadline: Deadline, **_: Any) -> UnitResult:
+        time.sleep(max(0.0, deadline.left))
         return everything(mode, p, targets)
 
     engine(fake)
@@ -116,8 +117,8 @@ def test_every_unit_gets_its_share_of_the_budget(engine: Engine, monkeypatch: py
     monkeypatch.setattr(build_module, "COUNT", 2)
     shares = []
 
-    def fake(mode: Any, p: Any, targets: Any, *, deadline: float, **_: Any) -> UnitResult:
-        shares.append(deadline - time.monotonic())
+    def fake(mode: Any, p: Any, targets: Any, *, deadline: Deadline, **_: Any) -> UnitResult:
+        shares.append(deadline.left)
         return everything(mode, p, targets)
 
     engine(fake)

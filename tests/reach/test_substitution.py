@@ -20,7 +20,7 @@ P = np.array([0.61, 0.17])
 
 def flow_of(piece: Piece | None = None) -> Flow:
     compiled = compile_mode(oscillator().mode, None, observed=False)
-    chain = Chain(compiled, compiled.fields, piece or compiled.whole(), Order(4, 2))
+    chain = Chain(compiled, piece or compiled.whole(), Order(4, 2))
     assert chain.run(0.5)
     return chain.flows[0]
 

@@ -28,7 +28,7 @@ def same_start_escapes(made: Plant, count: int, rng: np.random.Generator) -> tup
     """Runs outside the set of their own start, at the ends of steps and inside them; and how far was looked."""
     c = compile_mode(made.mode, None)
     order = ORDERS[made.seed % len(ORDERS)]
-    flow = Flow(c.fields, c.whole(), c.w_centre, c.w_radius, order, names=c.loop.names, stops=c.stops)
+    flow = Flow(c.fields, c.whole(), c.w_centre, c.w_radius, order, names=c.loop.names)
     flow.run(UNTIL)
     while flow.steps and not np.isfinite(flow.steps[-1].G).all():
         flow.steps.pop()

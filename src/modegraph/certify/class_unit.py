@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +16,7 @@ from modegraph.certify.switching.common_time import proved_instants
 from modegraph.certify.targets.family import TargetClass, target_class
 from modegraph.certify.unit import TargetSpec
 from modegraph.certify.verdict import Floats, Status, Verdict
+from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
 from modegraph.expression.scalar import Expr
 from modegraph.expression.simplify import simplify
@@ -59,17 +59,16 @@ def relate(
     targets: Sequence[TargetSpec],
     *,
     horizon: float | None,
-    deadline: float,
+    deadline: Deadline,
     progress: Callable[[str], None],
-    thorough: bool = False,
+    cuts: int = 0,
 ) -> ClassResult:
     """The relations from a mode - under one reference, or p = None for its whole class - to its targets.
 
     Parameters
     ----------
     horizon : seconds a switch may take; None: the duration of the reference and some more.
-    thorough : smaller parts of the starts are tried until the deadline, as long as they certify more
-        references.
+    cuts : how often the starts are cut at most, as long as smaller parts certify more references.
     """
     compiled = compile_mode(mode, p)
     end = horizon if horizon is not None else 2.0 * (mode.reference.duration or 0.5 * DEFAULT_HORIZON)
@@ -79,8 +78,7 @@ def relate(
     goals = [_goal(spec, compiled.plant) for spec in targets]
     links = Links(compiled, region, [goal for goal in goals if isinstance(goal, TargetClass)], rest, end, chains)
     links.appear(deadline, progress)
-    if thorough:
-        links.refine(deadline, progress)
+    links.refine(cuts, deadline, progress)
     known = iter(links.relations)
     relations = [goal if isinstance(goal, str) else next(known) for goal in goals]
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
@@ -95,11 +93,13 @@ def _goal(spec: TargetSpec, plant: int) -> TargetClass | str:
         return str(error)
 
 
-def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]) -> list[Chain]:
+def _legal_chains(
+    compiled: CompiledMode, end: float, deadline: Deadline, progress: Callable[[str], None]
+) -> list[Chain]:
     """Chains that cover all starts, cut where a constraint cannot be proved, as long as that helps."""
     cutting = Cutting(compiled, end, deadline)
     chains, _ = cutting.run()
-    while len(chains) < MOST_PARTS and time.monotonic() < deadline:
+    while len(chains) < MOST_PARTS and not deadline.is_over:
         progress(f"{len(chains)} parts")
         worst = min(chains, key=proved_until)
         until = proved_until(worst)
@@ -109,7 +109,7 @@ def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress:
             halves, order = [worst.piece], Order(CURVED, CURVED - 1)
         else:
             halves, order = worst.piece.split(nonlinear_variable(worst.flows[0])), worst.order
-        children = [Chain(compiled, cutting.framed, half, order, deadline) for half in halves]
+        children = [Chain(compiled, half, order, deadline) for half in halves]
         for child in children:
             child.run(end)
         further = min(map(proved_until, children), default=np.inf) > PROGRESS * until

@@ -12,6 +12,15 @@ from modegraph.reach.flow.flow import Flow
 
 
 @dataclass
+class Waiting:
+    """A part of the starts that waits: its flows until there, how it may go on alone, and what it showed alone."""
+
+    flows: list[Flow]
+    following: Flow | None = None
+    alone: Findings | None = None
+
+
+@dataclass
 class Findings:
     """What one part of the starts showed: a proof or the best miss for each goal, and for the check."""
 
@@ -26,19 +35,21 @@ class Findings:
     """A sampled start really breaks a constraint: smaller parts cannot help."""
     refused: bool = False
     """Its remainder fed itself too much to wait for a common restart."""
+    held_back: bool = False
+    """It, or one of the parts it was cut into, was refused."""
     empty: bool = False
     """The part is proved to hold no start: the others decide without it."""
     flow: Flow | None = None
     last: Flow | None = None
-    parked: list[Flow] = field(default_factory=list)
-    """Flows that wait for a common restart, because the disturbance has filled them."""
+    waits: list[Waiting] = field(default_factory=list)
+    """Parts that wait to go on together, because the disturbance has filled them."""
     waiting: dict[int, list[SwitchProof]] = field(default_factory=dict)
-    """Goals that depend on the parked flows, with the proofs of the other parts."""
+    """Goals that depend on the parts that wait, with the proofs of the other parts."""
     waiting_safety: list[SafetyProof] | None = None
 
     def unpark(self, why: str) -> None:
         """Nothing waits any more: the part is too large, for this reason."""
-        self.parked, self.waiting, self.waiting_safety = [], {}, None
+        self.waits, self.waiting, self.waiting_safety = [], {}, None
         self.failure = too_wide(why)
 
 
@@ -79,7 +90,8 @@ def merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], saf
     if not parts:
         found.empty = True
         return found
-    found.parked = [flow for part in parts for flow in part.parked]
+    found.held_back |= any(part.held_back for part in parts)
+    found.waits = [chain for part in parts for chain in part.waits]
     for j in wanted:
         if j in found.proofs:
             continue

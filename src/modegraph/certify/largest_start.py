@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import Any
 
-from modegraph.certify.decision import Decision
-from modegraph.certify.unit import exploration_of
+from modegraph.certify.decision import decide
+from modegraph.certify.question import Question
+from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Set, Sublevel
@@ -80,7 +80,7 @@ class _Search:
 
     def __init__(self, mode: Mode, compiled: CompiledMode, shape: Set) -> None:
         self.mode, self.compiled, self.shape = mode, compiled, shape
-        self.end = time.monotonic() + SECONDS
+        self.end = Deadline(SECONDS)
 
     def run(self) -> float:
         proved, missed = 0.0, 1.0
@@ -92,13 +92,13 @@ class _Search:
                 return proved
         while proved == 0.0:
             half = 0.5 * missed
-            if half < SMALLEST or time.monotonic() > self.end:
+            if half < SMALLEST or self.end.is_over:
                 return 0.0
             if self._holds(half):
                 proved = half
             else:
                 missed = half
-        while missed > PRECISION * proved and time.monotonic() < self.end:
+        while missed > PRECISION * proved and not self.end.is_over:
             middle = 0.5 * (proved + missed)
             if self._holds(middle):
                 proved = middle
@@ -108,11 +108,11 @@ class _Search:
 
     def _holds(self, scale: float) -> bool:
         """Whether Assumption 1 is proved for the shape at this scale."""
-        deadline = min(self.end, time.monotonic() + SECONDS_EACH)
+        deadline = Deadline(SECONDS_EACH, self.end)
         try:
             compiled = replace(self.compiled, start=scaled(self.shape, scale))
-            exploration = exploration_of(compiled, {}, self.mode.horizon, deadline, lambda text: None)
-            return Decision(exploration).decide(compiled.whole(), []).safety is not None
+            question = Question(compiled, {}, self.mode.horizon, deadline)
+            return decide(question, compiled.whole(), []).safety is not None
         except ModegraphError:
             # A limit of the engine: the model itself was checked when it was compiled.
             return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ from modegraph.certify.evidence import proved
 from modegraph.certify.moments import moments_of
 from modegraph.certify.relation import Part, Relation, whole_relation
 from modegraph.certify.targets.family import TargetClass
+from modegraph.deadline import Deadline
 from modegraph.model.sets import Box
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.cover.chain import Chain
@@ -67,14 +67,17 @@ class Links:
     def _proofs(self, chain: Chain) -> list[Part | None]:
         return [part_of(chain, goal, self.end, len(self.compiled.parameters)) for goal in self.goals]
 
-    def refine(self, until: float, progress: Callable[[str], None]) -> None:
-        """Cut the starts until the instant ``until`` of ``time.monotonic()``, where it helps, worst part first."""
-        if not self.goals:
+    def refine(self, cuts: int, until: Deadline, progress: Callable[[str], None]) -> None:
+        """Cut the starts where it helps, worst part first."""
+        if not self.goals or not cuts:
             return
         pairs = [self._pairs(relation, k) for k, relation in enumerate(self.relations)]
         open_, failing = self._failing(pairs)
         hopeless: set[Chain] = set()
-        while open_ > SMALL * SAMPLES * len(pairs) and len(self.chains) < MOST_PARTS and time.monotonic() < until:
+        for _ in range(cuts):
+            enough = open_ <= SMALL * SAMPLES * len(pairs) or len(self.chains) >= MOST_PARTS
+            if enough or until.is_over:
+                return
             candidates = [c for c in self.chains if c not in hopeless and c.shared == 0 and c.piece.depth < DEEPEST]
             if not candidates:
                 return
@@ -92,11 +95,11 @@ class Links:
                 continue
             open_, failing = now, failing_now
 
-    def appear(self, until: float, progress: Callable[[str], None]) -> None:
+    def appear(self, until: Deadline, progress: Callable[[str], None]) -> None:
         """Cut the starts where a target that no pair of references is certified for is nearly met."""
         for j in range(len(self.goals)):
             source, target, gauge = self._nearest(j)
-            while 1.0 < gauge <= NEAR and len(self.chains) < MOST_PARTS and time.monotonic() < until:
+            while 1.0 < gauge <= NEAR and len(self.chains) < MOST_PARTS and not until.is_over:
                 worst = max(self.chains, key=lambda chain: self._gauge(chain, j, source, target))
                 if worst.shared or worst.piece.depth >= DEEPEST:
                     break
@@ -126,10 +129,10 @@ class Links:
             return 0.0
         return float(Relation(self.region, goal, (part,), None).crossings(source, target).gauge[0])
 
-    def _cut(self, chain: Chain, until: float) -> None:
+    def _cut(self, chain: Chain, until: Deadline) -> None:
         """Halves of one chain's starts in its place."""
         halves = chain.piece.split(nonlinear_variable(chain.flows[0]))
-        children = [Chain(self.compiled, chain.framed, half, chain.order, until) for half in halves]
+        children = [Chain(self.compiled, half, chain.order, until) for half in halves]
         for child in children:
             child.run(self.end)
             self._parts[child] = self._proofs(child)

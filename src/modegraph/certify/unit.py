@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -22,22 +21,24 @@ from modegraph.certify.counterexamples.trajectory import (
     scene_of,
     trapped_in,
 )
-from modegraph.certify.decision import Decision
+from modegraph.certify.decision import decide
 from modegraph.certify.evidence import slack_until, width_over_time
-from modegraph.certify.exploration import Exploration, Goal
 from modegraph.certify.findings import Findings
 from modegraph.certify.proof import SwitchProof, certified_check, certified_switch
+from modegraph.certify.question import Goal, Question
 from modegraph.certify.switching.common_time import Nearest
 from modegraph.certify.targets.region import Region
 from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Witness
+from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
+from modegraph.guarded import guarded
 from modegraph.model.closed_loop import close_loop, mode_start
 from modegraph.model.mode import Mode
 from modegraph.model.sets import is_subset
 from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode, compile_mode, compile_reset
-from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.flow.flow import Order
 from modegraph.reach.tail.box import Tail, TailSearch
 
 POINT_STEPS = 3000
@@ -69,7 +70,7 @@ def certify_unit(
     targets: Sequence[TargetSpec],
     *,
     horizon: float | None,
-    deadline: float,
+    deadline: Deadline,
     progress: Callable[[str], None] | None = None,
     switches_only: bool = False,
     until: float = np.inf,
@@ -79,7 +80,7 @@ def certify_unit(
     Parameters
     ----------
     horizon : seconds a switch may take; None: until a tail is certified or the deadline.
-    deadline : instant of ``time.monotonic()`` after which what is not decided is UNDECIDED.
+    deadline : after which what is not decided is UNDECIDED.
     switches_only : look for proofs of switches alone, not for that of Assumption 1 nor for counterexamples
         (but for equilibria, which cost nothing).
     until : seconds after which no proof of a switch is looked for, for a quick answer.
@@ -87,31 +88,6 @@ def certify_unit(
     compiled = compile_mode(mode, p)
     tick = progress or (lambda text: None)
     return _Unit(mode, p, compiled, targets, horizon, deadline, tick, switches_only, until).run()
-
-
-def exploration_of(
-    compiled: CompiledMode,
-    goals: Mapping[int, Goal],
-    horizon: float | None,
-    deadline: float,
-    tick: Callable[[str], None],
-    until: float = np.inf,
-) -> Exploration:
-    """The exploration of a compiled mode."""
-    return Exploration(
-        compiled.fields,
-        compiled.framed_fields,
-        goals,
-        plant=compiled.plant,
-        w=(compiled.w_centre, compiled.w_radius),
-        names=compiled.loop.names,
-        reset=compiled.own_reset,
-        horizon=horizon,
-        stops=compiled.stops,
-        deadline=deadline,
-        tick=tick,
-        until=until,
-    )
 
 
 def goal_of(spec: TargetSpec, plant: int) -> Goal:
@@ -134,7 +110,7 @@ class _Unit:
         compiled: CompiledMode,
         targets: Sequence[TargetSpec],
         horizon: float | None,
-        deadline: float,
+        deadline: Deadline,
         tick: Callable[[str], None],
         switches_only: bool,
         until: float,
@@ -167,19 +143,20 @@ class _Unit:
 
     def _prove(self) -> None:
         compiled = self.compiled
-        exploration = exploration_of(compiled, dict(self.goals), self.horizon, self.deadline, self.tick, self.until)
-        self._switches_in_zero_time()
+        guarded("the switches in zero time", self._switches_in_zero_time, _nothing)
         scene = scene_of(self.mode, self.compiled)
-        self._trap_all(scene, [k for k in self.goals if k not in self.verdicts])
+        left = [k for k in self.goals if k not in self.verdicts]
+        guarded("the search for equilibria", lambda: self._trap_all(scene, left), _nothing)
         wanted = [k for k in self.goals if k not in self.verdicts]
-        found = Decision(exploration).decide(compiled.whole(), wanted, safety=not self.switches_only)
+        question = Question(compiled, dict(self.goals), self.horizon, self.deadline, self.tick, self.until)
+        found = decide(question, compiled.whole(), wanted, safety=not self.switches_only)
         for k in wanted:
             if k in found.proofs:
                 self.verdicts[k] = self._switch(k, found.proofs[k])
         if found.safety is not None:
             self.check = certified_check(found.safety)
         if not self.switches_only:
-            self._refute(scene, found)
+            guarded("the search for counterexamples", lambda: self._refute(scene, found), _nothing)
         for k in wanted:
             if k not in self.verdicts:
                 self.verdicts[k] = self._undecided(found, k)
@@ -205,11 +182,7 @@ class _Unit:
         ]  # fmt: skip
         if not candidates:
             return
-        flow = Flow(
-            compiled.fields, compiled.whole(), compiled.w_centre, compiled.w_radius,
-            Order(1, 0) if all(f.linear for f in compiled.fields) else Order(4, 2),
-            names=compiled.loop.names, reset=compiled.own_reset,
-        )  # fmt: skip
+        flow = compiled.flow(compiled.whole(), Order(1, 0) if compiled.linear else Order(4, 2))
         if flow.failure is not None or not (flow.faces_at(0.0, flow.p0, flow.G0, 0) <= 0.0).all():
             return
         slack = slack_until(flow, 0)
@@ -256,7 +229,7 @@ class _Unit:
         outside, broken = followed_in_floats(scene, runs, d, list(regions.values()), end, safety=self.check is None)
         never = dict(zip(regions, outside, strict=True))
         for r, (x0, w) in enumerate(runs):
-            if (not left and self.check is not None) or time.monotonic() > self.deadline:
+            if (not left and self.check is not None) or self.deadline.is_over:
                 return
             if broken[r] or any(never[k][r] for k in left):
                 left = self._try_run(PointRun(scene, x0, w, d, longest_step=end / FLOAT_STEPS), left)
@@ -300,7 +273,7 @@ class _Unit:
         end = LONGEST_RUN if self.horizon is None else self.horizon
         checkpoint = 30
         while run.violation is None and run.flow.time < end and len(run.flow.steps) < POINT_STEPS:
-            if time.monotonic() > self.deadline:
+            if self.deadline.is_over:
                 break
             before = len(run.flow.steps)
             run.extend(end, checkpoint)
@@ -384,7 +357,7 @@ class _Unit:
             parts.append(str(found.unproved))
         if found.failure:
             parts.append("the flowpipe ends " + found.failure)
-        if time.monotonic() > self.deadline:
+        if self.deadline.met:
             parts.append("the budget ended; try a larger budget=")
         elif missed is not None and not parts:
             parts.append("the constraints are not proved at t = 0")
@@ -412,6 +385,10 @@ class _Unit:
             tail = found.tail_reason or "no invariant set was tried"
             parts = [f"constraints proved until t = {found.safe_until:.4g} s, but not for all time: {tail}"]
         return Verdict(Status.UNDECIDED, "; ".join(parts), until=found.safe_until)
+
+
+def _nothing(error: Exception) -> None:
+    """What was decided before the engine stopped stays decided."""
 
 
 def _short(x: Floats) -> str:

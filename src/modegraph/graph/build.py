@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from threading import Lock
 from typing import Any
@@ -18,10 +17,12 @@ from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.cores import COUNT, one_core, single_threaded_algebra
+from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.classes import Classes, Link
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.graph.progress import Progress, reporting
+from modegraph.guarded import note, stopped
 from modegraph.model.closed_loop import close_loop, mode_start
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
@@ -29,14 +30,16 @@ from modegraph.model.validation import validate_modes
 
 DEFAULT_BUDGET = 600.0
 """Seconds of work when ``budget`` is not given."""
-
+SECONDS_A_CUT = 1.0
+"""Of a given budget, for each cut that may certify more references: a measure of work, whatever a cut takes here.
+Measured on the quadrotor and the classes of the arm: .3 to 2 s."""
 
 SMALL = 1e-9
 """Widths that are compared are at least so large."""
 
 
-class _Stopped(Exception):
-    """Raised inside a unit when the build was interrupted."""
+class _Stopped(BaseException):
+    """Raised inside a unit when the build was interrupted: no error, so that nothing in the engine catches it."""
 
 
 def build(
@@ -86,9 +89,8 @@ def build(
     modes = validate_modes(modes)
     units = _units(modes, horizon)
     with reporting(progress) as report:
-        results = _Work(
-            units, report, DEFAULT_BUDGET if budget is None else float(budget), thorough=budget is not None
-        ).run()
+        cuts = 0 if budget is None else int(float(budget) / len(units) / SECONDS_A_CUT)
+        results = _Work(units, report, DEFAULT_BUDGET if budget is None else float(budget), cuts).run()
     verdicts: dict[tuple[Node, Node], Verdict] = {}
     checks: dict[Node, Verdict] = {}
     links: dict[tuple[Node, Node], Link] = {}
@@ -130,8 +132,21 @@ class _Unit:
 
 @dataclass(frozen=True)
 class _Result:
+    """What a unit showed; ``cut_short``: the end of its time had a part in it."""
+
     finite: UnitResult
     links: dict[tuple[Node, Node], Link]
+    cut_short: bool = False
+
+    def with_(self, later: _Result) -> _Result:
+        """What the unit showed when it was done once more, and what it had decided before."""
+        pairs = zip(self.finite.verdicts, later.finite.verdicts, strict=True)
+        verdicts = [_decided(*pair) for pair in pairs]
+        return replace(later, finite=UnitResult(verdicts, _decided(self.finite.check, later.finite.check)))
+
+
+def _decided(earlier: Verdict, later: Verdict) -> Verdict:
+    return earlier if later.status is Status.UNDECIDED and earlier.status is not Status.UNDECIDED else later
 
 
 def _positive(name: str, value: float | None) -> None:
@@ -185,13 +200,13 @@ def _is_class(mode: Mode | Target) -> bool:
 
 
 def node_verdict(
-    modes: Sequence[Mode | Target], source: Node, target: Node, *, horizon: float | None, deadline: float
+    modes: Sequence[Mode | Target], source: Node, target: Node, *, horizon: float | None, deadline: Deadline
 ) -> Verdict:
     """The verdict on one pair of nodes of finite classes, from the very unit of work that ``build`` would do.
 
     Parameters
     ----------
-    deadline : instant of ``time.monotonic()`` after which what is not decided is UNDECIDED.
+    deadline : after which what is not decided is UNDECIDED.
     """
     unit = next(u for u in _units(validate_modes(modes), horizon) if u.node == source)
     with one_core():
@@ -201,7 +216,7 @@ def node_verdict(
     return found.verdicts[unit.target_nodes.index(target)]
 
 
-def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None], thorough: bool) -> _Result:
+def _examined(unit: _Unit, deadline: Deadline, progress: Callable[[str], None], cuts: int) -> _Result:
     """Verdicts on the finite targets of a unit, and relations to the continuous ones."""
     finite: UnitResult | None = None
     if not _is_class(unit.mode):
@@ -218,41 +233,52 @@ def _examined(unit: _Unit, deadline: float, progress: Callable[[str], None], tho
         horizon=unit.horizon,
         deadline=deadline,
         progress=progress,
-        thorough=thorough,
+        cuts=cuts,
     )
     return _Result(finite or UnitResult([], found.check), unit.links(found.relations, found.slack))
 
 
 @dataclass(eq=False)
 class _Work:
-    """Units in a thread pool (the kernels release the interpreter lock), within a budget."""
+    """Units in a thread pool (the kernels release the interpreter lock), within a budget.
+
+    Each unit gets an equal share of the time that is left: a hard one cannot starve the others. What was cut short
+    by its share is done once more when all had theirs, so that no answer depends on the share, the number of cores
+    or the load, as long as the budget itself has not ended.
+    """
 
     units: Sequence[_Unit]
     report: Progress
     budget: float
-    thorough: bool = False
-    """Continuous classes are refined as long as there is time and it helps."""
+    cuts: int = 0
+    """How often the starts of a continuous class are cut for more certified references, at most."""
     stopped: bool = False
     done: int = 0
     lock: Any = field(default_factory=Lock)
 
     def run(self) -> list[_Result]:
-        threads = max(1, min(COUNT, len(self.units)))
-        self.end = time.monotonic() + self.budget
-        self.waiting = len(self.units)
-        self.threads = threads
+        self.end = Deadline(self.budget)
+        self.threads = max(1, min(COUNT, len(self.units)))
         self.report(0, len(self.units), "")
-        pools = ThreadPoolExecutor(max_workers=threads, thread_name_prefix="modegraph")
+        results: dict[_Unit, _Result] = {}
+        pools = ThreadPoolExecutor(max_workers=self.threads, thread_name_prefix="modegraph")
         with single_threaded_algebra(), pools as pool:
-            futures = {pool.submit(self._unit, unit): unit for unit in sorted(self.units, key=_size, reverse=True)}
-            try:
-                self._watch(futures)
-            except KeyboardInterrupt:
-                self._stop(futures)
-            except BaseException:
-                self._stop(futures)
-                raise
-        results = {unit: self._result(future, unit) for future, unit in futures.items()}
+            left = sorted(self.units, key=_size, reverse=True)
+            while left:
+                self.waiting = len(left)
+                futures = {pool.submit(self._unit, unit): unit for unit in left}
+                try:
+                    self._watch(futures)
+                except KeyboardInterrupt:
+                    self._stop(futures)
+                except BaseException:
+                    self._stop(futures)
+                    raise
+                found = {unit: self._result(future, unit) for future, unit in futures.items()}
+                results |= {u: r if u not in results else results[u].with_(r) for u, r in found.items()}
+                again = [unit for unit in left if found[unit].cut_short]
+                left = [] if self.stopped or self.end.left <= 0.0 else again
+                self.done -= len(left)
         return [results[unit] for unit in self.units]
 
     def _watch(self, futures: dict[Future[_Result], _Unit]) -> None:
@@ -263,7 +289,7 @@ class _Work:
             for future in finished:
                 future.result()
                 self.done += 1
-                self.report(self.done, len(futures), futures[future].mode.name)
+                self.report(self.done, len(self.units), futures[future].mode.name)
 
     def _stop(self, futures: dict[Future[_Result], _Unit]) -> None:
         self.stopped = True
@@ -272,7 +298,6 @@ class _Work:
 
     def _unit(self, unit: _Unit) -> _Result:
         with self.lock:
-            # An equal share of the time that is left: a hard unit cannot starve the others.
             rounds = math.ceil(self.waiting / self.threads)
             self.waiting -= 1
 
@@ -284,15 +309,16 @@ class _Work:
 
         try:
             with one_core():
-                now = time.monotonic()
-                if now >= self.end:
+                if self.end.is_over:
                     return unit.undecided(f"the budget of {self.budget:g} s ended before this mode was examined")
-                deadline = now + (self.end - now) / rounds
-                return _examined(unit, deadline, progress, self.thorough)
-        except (ModegraphError, _Stopped):
+                deadline = Deadline(self.end.left / rounds, self.end)
+                result = _examined(unit, deadline, progress, self.cuts)
+                return replace(result, cut_short=deadline.met)
+        except ModegraphError:
             raise
         except Exception as error:
-            return unit.undecided(f"the proof engine stopped with {type(error).__name__}: {error}")
+            note(f"mode {unit.mode.name!r}", error)
+            return unit.undecided(stopped(error))
 
     @staticmethod
     def _result(future: Future[_Result], unit: _Unit) -> _Result:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from modegraph.certify.counterexamples.witnessed import witnessed
 from modegraph.certify.verdict import Approach, Status, Unproved, Verdict
+from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
 from modegraph.graph.explanation import Blocking, Explanation, explanation_text
 from modegraph.graph.pair import Pair
@@ -72,7 +73,7 @@ class _Explainer:
         try:
             closest, breach = witnessed(
                 self.pair.source, self.pair.r_i, witness, self.pair.spec,
-                horizon=self.pair.source.horizon, deadline=time.monotonic() + WITNESS_SECONDS,
+                horizon=self.pair.source.horizon, deadline=Deadline(WITNESS_SECONDS),
             )  # fmt: skip
         except ModegraphError:
             return

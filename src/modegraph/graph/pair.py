@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, replace
 
 from modegraph.certify.references import Parameter
 from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Verdict
 from modegraph.cores import one_core
+from modegraph.deadline import Deadline
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Set, Sublevel, is_subset
 from modegraph.model.sets.scaled import scaled
@@ -109,7 +111,7 @@ class Pair:
         with one_core():
             found = certify_unit(
                 self.source, self.r_i, [self.spec],
-                horizon=self.source.horizon, deadline=deadline, switches_only=True, until=until,
+                horizon=self.source.horizon, deadline=_until(deadline), switches_only=True, until=until,
             )  # fmt: skip
         return found.verdicts[0]
 
@@ -119,4 +121,9 @@ class Pair:
 
         source = self.source.name, self.source.match(self.r_i)
         target = self.target.name, 0 if isinstance(self.target, Target) else self.target.match(self.r_j)
-        return node_verdict(self.modes, source, target, horizon=self.source.horizon, deadline=deadline)
+        return node_verdict(self.modes, source, target, horizon=self.source.horizon, deadline=_until(deadline))
+
+
+def _until(instant: float) -> Deadline:
+    """The deadline at an instant of ``time.monotonic()``."""
+    return Deadline(instant - time.monotonic())

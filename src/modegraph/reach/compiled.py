@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from modegraph.model.closed_loop import ClosedLoop, close_loop, mode_start
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Set
 from modegraph.reach.field import Field, Frame, compile_field, disturbance_box
+from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.parallelotope import slow_and_fast_axes
 from modegraph.reach.start.class_chart import class_chart
 from modegraph.reach.start.piece import Piece, whole
@@ -36,7 +38,6 @@ class CompiledMode:
     unknowns: dict[str, tuple[float, float]]
     parameters: list[tuple[float, float]]
     """Ranges of the parameters of a continuous class; empty for one reference."""
-    stops: Sequence[float]
 
     @property
     def plant(self) -> int:
@@ -53,6 +54,14 @@ class CompiledMode:
         curved = isinstance(self.start, StartClass) and not self.start.is_affine
         return all(f.flat for f in self.fields) and not curved
 
+    def flow(self, piece: Piece, order: Order, **options: Any) -> Flow:
+        """A flow from a piece of the starts; options as of `Flow`."""
+        return Flow(
+            self.fields, piece, self.w_centre, self.w_radius, order,
+            names=self.loop.names, reset=self.own_reset, **options,
+        )  # fmt: skip
+
+    @cached_property
     def framed_fields(self) -> list[Field]:
         """The fields in the modes of the loop, where a disturbance meets a nonlinear loop."""
         if self.linear or not self.w_radius.any():
@@ -124,5 +133,4 @@ def compile_mode(mode: Mode, p: Floats | None, start: Set | None = None, *, obse
         w_radius=radius,
         unknowns=unknowns,
         parameters=[] if region is None else list(zip(region.lo.tolist(), region.hi.tolist(), strict=True)),
-        stops=[],
     )

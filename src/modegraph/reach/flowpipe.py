@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modegraph.cores import in_parallel, one_core
+from modegraph.deadline import NEVER, Deadline
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box, Set
@@ -22,7 +22,6 @@ from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.ladder import class_orders, is_light, orders
 from modegraph.reach.cover.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
-from modegraph.reach.field import Field
 from modegraph.reach.flow.flow import Order
 from modegraph.reach.restrictor import Restrictor
 from modegraph.reach.slices import Slice, Slicer, hull, outline
@@ -314,9 +313,8 @@ class _Part:
 class Cutting:
     """Pieces of the start set, or of later sets, cut where the flowpipe ends first, as long as that gets further."""
 
-    def __init__(self, compiled: CompiledMode, end: float, deadline: float = math.inf) -> None:
+    def __init__(self, compiled: CompiledMode, end: float, deadline: Deadline = NEVER) -> None:
         self.compiled, self.end, self.deadline = compiled, end, deadline
-        self.framed: Sequence[Field] = compiled.framed_fields()
         self.disturbed = bool(compiled.w_radius.any())
 
     def run(self) -> tuple[list[Chain], str]:
@@ -331,7 +329,7 @@ class Cutting:
         while not stuck and any(part.chain.failure for part in parts):
             worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
             stuck = "; no more are tried"
-            if time.monotonic() > self.deadline or len(parts) >= MOST_PIECES:
+            if self.deadline.is_over or len(parts) >= MOST_PIECES:
                 break
             for k in self._places(worst.chain):
                 children = self._cut(worst, k, ladder)
@@ -349,7 +347,7 @@ class Cutting:
 
     def _tighter(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
         """Pieces of a class of references, the loosest cut as long as they are very loose and that helps."""
-        while len(parts) < MOST_LOOSE_PIECES and time.monotonic() < self.deadline:
+        while len(parts) < MOST_LOOSE_PIECES and not self.deadline.is_over:
             loosest = max(parts, key=lambda part: looseness(part.chain))
             if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
                 break
@@ -372,7 +370,7 @@ class Cutting:
 
     def _tightened(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
         """Complete parts, the widest cut on the way as long as that makes its end much narrower."""
-        while len(parts) < MOST_TIGHTENED and time.monotonic() < self.deadline:
+        while len(parts) < MOST_TIGHTENED and not self.deadline.is_over:
             size = np.maximum(_end_widths(parts), 1e-300)
             widest = max(parts, key=lambda part: float((_end_widths([part]) / size).sum()))
             places = [k for k in self._places(widest.chain) if k > 0 and k in widest.chain.fed()]
@@ -409,11 +407,11 @@ class Cutting:
         best: _Part | None = None
         given_up: _Part | None = None
         for rung in range(first, top + 1):
-            if best is not None and time.monotonic() > self.deadline:
+            if best is not None and self.deadline.is_over:
                 break
             if best is not None and not light[rung] and (best.chain.failure or not is_very_loose(best.chain)):
                 break
-            chain = Chain(self.compiled, self.framed, piece, ladder[rung], self.deadline)
+            chain = Chain(self.compiled, piece, ladder[rung], self.deadline)
             impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
             done = chain.run(self.end, is_given_up if impatient else None)
             if done and chain.time < self.end:

@@ -25,7 +25,7 @@ def scene(dynamics: Any, start: mg.Box, w: mg.Box | None = None, **more: Any) ->
     c = compile_mode(mode, None)
     none = np.zeros(0)
     lo, hi = (none, none) if w is None else (w.lo, w.hi)
-    return Scene(c.fields, c.start, c.plant, lo, hi, c.unknowns, c.loop.names, c.own_reset, c.stops)
+    return Scene(c.fields, c.start, c.plant, lo, hi, c.unknowns, c.loop.names, c.own_reset)
 
 
 NONE = np.zeros(0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +13,7 @@ from modegraph.certify.switching.common_time import Reach, find_crossings
 from modegraph.certify.targets.sublevel import SublevelRegion, target_region
 from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Status, Verdict
+from modegraph.deadline import Deadline
 from modegraph.enclosure.monomials import monomials
 from modegraph.model.sets import Set
 from modegraph.reach.bounds import PolynomialBounds
@@ -127,7 +127,7 @@ def mode(start: Any, field: Callable[..., Any], w: Any = None, **more: Any) -> m
 def verdict(source: mg.Mode, target: Set, horizon: float = 4.0) -> Verdict:
     spec = TargetSpec("t", None, mg.Target("t", target))
     p = source.reference.parameters()[0]
-    return certify_unit(source, p, [spec], horizon=horizon, deadline=time.monotonic() + 60).verdicts[0]
+    return certify_unit(source, p, [spec], horizon=horizon, deadline=Deadline(60.0)).verdicts[0]
 
 
 def falling(x: Any) -> Any:

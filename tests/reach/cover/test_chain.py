@@ -46,7 +46,7 @@ def van_der_pol(unknown: bool = False) -> mg.Mode:
 
 def run_of(mode: mg.Mode, end: float) -> Chain:
     compiled = compile_mode(mode, None)
-    found = Chain(compiled, compiled.framed_fields(), compiled.whole(), Order(6, 3))
+    found = Chain(compiled, compiled.whole(), Order(6, 3))
     assert found.run(end), found.failure
     return found
 

@@ -13,7 +13,7 @@ from tests.soundness.families import oscillator
 
 def chain_of(degree: int, until: float) -> Chain:
     compiled = compile_mode(oscillator().mode, None, observed=False)
-    chain = Chain(compiled, compiled.fields, compiled.whole(), Order(degree, 2))
+    chain = Chain(compiled, compiled.whole(), Order(degree, 2))
     chain.run(until)
     return chain
 

@@ -73,7 +73,7 @@ def holds(flow: Flow, x: np.ndarray) -> None:
 @pytest.mark.parametrize("framed", [False, True])
 def test_a_restart_holds_the_end(compiled: CompiledMode, framed: bool) -> None:
     flow = flow_of(compiled, compiled.whole(), 14)
-    following = restarted([flow], compiled.framed_fields() if framed else compiled.fields)
+    following = restarted([flow], compiled.framed_fields if framed else compiled.fields)
     assert following is not None
     assert following.time == flow.time
     holds(following, points(flow))
@@ -121,7 +121,7 @@ def test_a_common_restart_holds_all_ends(compiled: CompiledMode) -> None:
 
 
 def test_a_chain_holds_trajectories_under_switched_disturbances(compiled: CompiledMode) -> None:
-    chain = Chain(compiled, compiled.framed_fields(), compiled.whole(), Order(3, 2))
+    chain = Chain(compiled, compiled.whole(), Order(3, 2))
     assert chain.run(1.5), chain.failure
     flow = chain.flows[-1]
     lo, hi = flow.end_box()

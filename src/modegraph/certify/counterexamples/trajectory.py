@@ -46,7 +46,6 @@ class Scene:
     unknowns: dict[str, tuple[float, float]]
     names: Sequence[str]
     reset: Tape | None
-    stops: Sequence[float]
 
     def disturbances(self) -> Iterator[Floats]:
         """Constant disturbances worth trying: the centre, then the corners that matter most."""
@@ -76,7 +75,6 @@ def scene_of(mode: Mode, compiled: CompiledMode) -> Scene:
         unknowns=compiled.unknowns,
         names=compiled.loop.names,
         reset=compiled.own_reset,
-        stops=compiled.stops,
     )
 
 
@@ -94,7 +92,6 @@ class PointRun:
             POINT_ORDER,
             names=scene.names,
             reset=scene.reset if len(x0) == scene.plant else None,
-            stops=scene.stops,
             longest_step=longest_step,
         )
         self.violation: float | None = None

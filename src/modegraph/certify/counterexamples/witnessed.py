@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from modegraph.certify.counterexamples.trajectory import PointRun, scene_of
 from modegraph.certify.switching.common_time import Nearest, Reach
 from modegraph.certify.unit import POINT_STEPS, TargetSpec, goal_of
 from modegraph.certify.verdict import Approach, Floats, Unproved, Witness
+from modegraph.deadline import Deadline
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 from modegraph.reach.compiled import compile_mode
@@ -23,7 +23,7 @@ LONG = 20.0
 
 
 def witnessed(
-    mode: Mode, p: Floats | None, witness: Witness, spec: TargetSpec, *, horizon: float | None, deadline: float
+    mode: Mode, p: Floats | None, witness: Witness, spec: TargetSpec, *, horizon: float | None, deadline: Deadline
 ) -> tuple[Approach | None, Unproved | None]:
     """How near the trajectory of a witness comes to the target, and which constraint it violates.
 
@@ -34,7 +34,7 @@ def witnessed(
     Parameters
     ----------
     horizon : seconds; None: a little longer than the witness needs.
-    deadline : instant of ``time.monotonic()`` after which the trajectory is followed no further.
+    deadline : after which the trajectory is followed no further.
     """
     compiled = compile_mode(mode, p)
     scene = scene_of(mode, compiled)
@@ -46,7 +46,7 @@ def witnessed(
     d = np.array([witness.d.get(name, middle) for name, middle in zip(scene.unknowns, scene.constants(), strict=True)])
     run = PointRun(scene, np.asarray(witness.x0, float), w, d, end / LOOKS if end else np.inf)
     steps = 0
-    while run.violation is None and run.flow.time < end and steps < POINT_STEPS and time.monotonic() < deadline:
+    while run.violation is None and run.flow.time < end and steps < POINT_STEPS and not deadline.is_over:
         steps += 50
         before = run.flow.time
         run.extend(end, steps)

@@ -13,6 +13,7 @@ from modegraph.certify.samples import sample_powers
 from modegraph.certify.switching.common_time import Missed, Nearest
 from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Floats
+from modegraph.deadline import Deadline
 from modegraph.reach.flow.flow import Flow
 from modegraph.reach.tail.box import Tail
 from modegraph.reach.tail.decay import SettledLoop
@@ -132,10 +133,10 @@ def gauge_of(ball: NormBall, region: Region) -> float:
 
 
 class Funnels:
-    """The funnels of one settled loop, built where a flow has got small enough."""
+    """The funnels of one settled loop, built where a flow has got small enough; for one chain of flows alone."""
 
-    def __init__(self, loop: SettledLoop) -> None:
-        self.builder = FunnelBuilder(loop)
+    def __init__(self, loop: SettledLoop, deadline: Deadline) -> None:
+        self.builder = FunnelBuilder(loop, deadline)
         self.known: list[Funnel] = []
 
     def enter(self, flow: Flow, regions: Sequence[Region]) -> Sinking | NoFunnel:

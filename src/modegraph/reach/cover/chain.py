@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
 
 import numpy as np
 
+from modegraph.deadline import NEVER, Deadline
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.restart import WIDE_GAP, halved, restarted
-from modegraph.reach.field import Field
-from modegraph.reach.flow.flow import LATE_FEEDBACK, RESTART_STEPS, Flow, Order
+from modegraph.reach.flow.flow import LATE_FEEDBACK, RESTART_STEPS, Order
 from modegraph.reach.parallelotope import mode_gap
 from modegraph.reach.start.piece import Piece
 
@@ -24,19 +22,13 @@ class Chain:
     Chains that are halves of another share its first flows.
     """
 
-    def __init__(
-        self, compiled: CompiledMode, framed: Sequence[Field], piece: Piece, order: Order, deadline: float = math.inf
-    ) -> None:
-        """``deadline``: instant of ``time.monotonic()`` at which it stops where it is."""
+    def __init__(self, compiled: CompiledMode, piece: Piece, order: Order, deadline: Deadline = NEVER) -> None:
+        """``deadline``: at which it stops where it is."""
         self.deadline = deadline
         self.piece = piece
         self.order = order
-        self.framed = framed
         self.compiled = compiled
-        first = Flow(
-            compiled.fields, piece, compiled.w_centre, compiled.w_radius, order,
-            names=compiled.loop.names, reset=compiled.own_reset, stops=compiled.stops, lean=True,
-        )  # fmt: skip
+        first = compiled.flow(piece, order, lean=True)
         self.flows = [first]
         self.failure = "" if first.failure is None else str(first.failure)
         """Why it stopped; empty while it has not."""
@@ -50,7 +42,7 @@ class Chain:
             if give_up is not None and give_up(self):
                 return True
             flow = self.flows[-1]
-            if time.monotonic() > self.deadline:
+            if self.deadline.is_over:
                 self.failure = f"at t = {flow.time:.6g} s the budget ended; give more, or shorten the horizon"
                 return False
             if not flow.advance(end):
@@ -65,7 +57,7 @@ class Chain:
         """In the coordinates of the plant first, then in the frame of the modes, tighter in the end."""
         flow = self.flows[-1]
         in_modes = len(self.flows) > 1 or mode_gap(flow.slope) > WIDE_GAP
-        fields = self.framed if in_modes else self.compiled.fields
+        fields = self.compiled.framed_fields if in_modes else self.compiled.fields
         following = restarted([flow], fields)
         if following is None or flow.time >= end or not following.advance(end):
             flow.next_restart = len(flow.steps) + RESTART_STEPS

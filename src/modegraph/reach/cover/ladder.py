@@ -65,7 +65,7 @@ def class_orders(compiled: CompiledMode, piece: Piece, end: float) -> list[Order
     found = orders(compiled, piece.variables)
     if compiled.flat or len(found) == 1:
         return found
-    probe = Chain(compiled, compiled.fields, piece, found[0])
+    probe = Chain(compiled, piece, found[0])
     disturbed = bool(compiled.w_radius.any())
     done = probe.run(end, _feeds_itself if disturbed else None)
     if done and not disturbed and not is_loose(probe):

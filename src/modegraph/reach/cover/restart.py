@@ -85,7 +85,6 @@ def _like(
         flow.w_radius,
         order,
         names=flow.names,
-        stops=flow.stops,
         t0=t0,
         energy=energy,
         longest_step=flow.longest_step,

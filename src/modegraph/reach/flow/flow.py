@@ -17,6 +17,7 @@ from modegraph.enclosure.step import (
     flow_step,
 )
 from modegraph.expression.tape import Tape
+from modegraph.guarded import note, stopped
 from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.field import Field
 from modegraph.reach.flow.breakdown import breakdown
@@ -89,7 +90,6 @@ class Flow:
         *,
         names: Sequence[str],
         reset: Tape | None = None,
-        stops: Sequence[float] = (),
         t0: float = 0.0,
         energy: float = 0.0,
         framed: bool = False,
@@ -116,7 +116,6 @@ class Flow:
         self.longest_step = longest_step
         self.generation = generation
         self.lean = lean
-        self.stops = sorted(s for s in stops if s > t0)
         self.steps: list[Step] = []
         self.h = 0.0
         n = self.fields[0].states
@@ -229,8 +228,14 @@ class Flow:
 
     def advance(self, limit: float) -> bool:
         """One step towards ``limit``; False when the flowpipe has failed."""
-        with np.errstate(all="ignore"):
-            return self._advance(limit)
+        try:
+            with np.errstate(all="ignore"):
+                return self._advance(limit)
+        except Exception as error:
+            # What was proved until here stays proved.
+            note(f"a step from t = {self.time:.6g} s", error)
+            self.failure = Failure(self.time, stopped(error), "report it, with the model")
+            return False
 
     def _advance(self, limit: float) -> bool:
         if self.failure is not None:
@@ -238,7 +243,7 @@ class Flow:
         fld = self.fields[self.segment]
         if self.h <= 0.0:
             self.h = self._first_step()
-        stop = min([limit, fld.end, *(s for s in self.stops if s > self.time)][:3])
+        stop = min(limit, fld.end)
         h_try = min(self.h, self.longest_step)
         shortened = 0
         for _ in range(60):

@@ -113,7 +113,7 @@ class _Walk:
         self.powers, self.solve = _samples(flow.order.weights or (1,) * flow.piece.variables, flow.order.degree)
         walk = copy(flow)
         walk.fields, walk.segment, walk.first_segment, walk.time = [own], 0, 0, 0.0
-        walk.stops, walk.longest_step, walk.steps = [], np.inf, []
+        walk.longest_step, walk.steps = np.inf, []
         walk._spaces, walk._sizes, walk._longest, walk._passages = {}, [], 0.0, None
         self.walk = walk
         self.unit = 2.0 ** (math.frexp(h)[1] - FINE)

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.deadline import NEVER, Deadline
 from modegraph.enclosure.monomials import monomial_count, monomials
 from modegraph.enclosure.rounding import TINY, UNIT
 from modegraph.reach.field import Field, cover
@@ -149,8 +150,8 @@ class SettledLoop:
 class DecayRegion:
     """The matrices K + K' over {rho <= radius}, cut until what their polynomials miss is small."""
 
-    def __init__(self, loop: SettledLoop, norm: Norm, radius: float) -> None:
-        self.loop, self.norm, self.radius = loop, norm, radius
+    def __init__(self, loop: SettledLoop, norm: Norm, radius: float, deadline: Deadline = NEVER) -> None:
+        self.loop, self.norm, self.radius, self.deadline = loop, norm, radius, deadline
         self.enclosures = 1
         n = loop.fld.states
         self.parts: list[Slopes | None] = [loop.slopes(norm, radius, -np.ones(n), np.ones(n))]
@@ -168,7 +169,7 @@ class DecayRegion:
         while left:
             part = left.pop()
             spent = budget <= 0 or self.enclosures > MOST_ENCLOSURES or len(settled) + len(left) > MOST_PARTS
-            if part is None or spent:
+            if part is None or spent or self.deadline.is_over:
                 self.parts = [*settled, *left, part]
                 return False
             if part.coarse(M):

@@ -16,6 +16,7 @@ from itertools import dropwhile, takewhile
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.deadline import NEVER, Deadline
 from modegraph.enclosure.monomials import monomials
 from modegraph.enclosure.rounding import TINY, UNIT
 from modegraph.reach.bounds import PolynomialBounds
@@ -196,8 +197,8 @@ class NoFunnel:
 class FunnelBuilder:
     """Proposes and proves funnels of one loop."""
 
-    def __init__(self, loop: SettledLoop) -> None:
-        self.loop = loop
+    def __init__(self, loop: SettledLoop, deadline: Deadline = NEVER) -> None:
+        self.loop, self.deadline = loop, deadline
         self._floats = FloatLoop(loop.fld, loop.w_centre, loop.w_radius, loop.unknown_lo, loop.unknown_hi)
 
     # -- floats: proposals -----------------------------------------------------------------------
@@ -275,9 +276,11 @@ class FunnelBuilder:
             narrowed = added[-1].lower / added[0].radius
             scale = scale * narrowed
             last = NormBall(added[-1].norm, added[-1].lower, self.loop)
-            if narrowed > NARROWED or enough(last):
+            if narrowed > NARROWED or enough(last) or self.deadline.is_over:
                 break
         if not rungs:
+            if self.deadline.is_over:
+                return NoFunnel("the budget ended before an ellipsoid was proved to shrink")
             return NoFunnel("no ellipsoid around the reach set is proved to shrink")
         kept = usable(rungs)
         return (
@@ -322,7 +325,7 @@ class FunnelBuilder:
         share = length / length.sum()
         rungs: list[Rung] = []
         while True:
-            region = DecayRegion(self.loop, norm, radius)
+            region = DecayRegion(self.loop, norm, radius, self.deadline)
             chosen = self._step_down(region, radius, columns, share, float(length.sum()))
             if chosen is None:
                 return rungs

@@ -1,0 +1,239 @@
+"""Following a chain of flows until its goals are decided, or nothing more can be expected of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from modegraph.certify.evidence import set_size
+from modegraph.certify.question import Question
+from modegraph.certify.switching.common_time import proved_instants
+from modegraph.certify.switching.funnel import Arrival, Funnels, Sinking
+from modegraph.guarded import guarded, stopped
+from modegraph.reach.cover.restart import WIDE_GAP, filled_share, restarted
+from modegraph.reach.flow.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow
+from modegraph.reach.parallelotope import mode_gap
+from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
+from modegraph.reach.tail.decay import SettledLoop
+from modegraph.reach.tail.funnel import NoFunnel
+
+SETTLING = 4.0
+"""Time constants of the slowest mode to wait, after a tail is found, before giving up on a target."""
+TOO_MUCH_FEEDBACK = 0.5
+"""Share of a remainder that comes from itself at which a flow is stopped, where others wait for it."""
+WORTH_A_TAIL = 0.7
+"""An invariant set is looked for again when the reach set is smaller by this factor."""
+STALLED = 0.98
+"""A gauge that shrinks by less than this from one look to the next does so no more."""
+IDLE_LOOKS = 4
+"""Such looks in a row until an invariant set is looked for, where a flow may be enclosed again before."""
+FIRST_LOOK = 8
+"""Steps until the goals are looked at; from then on a quarter more each time, and LATER_LOOK."""
+LATER_LOOK = 4
+
+
+@dataclass
+class Course:
+    """One chain of flows, followed as far as its goals need.
+
+    Attributes
+    ----------
+    flows : the chain, extended in place
+    tail : Tail, Sinking or None
+        What closes the time axis, or else the ``reason`` there is nothing.
+    parked : bool
+        The last flow wants to be restarted; ``following`` is the flow that may go on alone, if there is one.
+    nearest : goal to (gauge, seconds)
+        The least gauge at the looks, and when that was.
+    """
+
+    question: Question
+    flows: list[Flow]
+    park: bool
+    common: bool
+    tail: Tail | Sinking | None = None
+    reason: str = ""
+    parked: bool = False
+    following: Flow | None = None
+    nearest: dict[int, tuple[float, float]] = field(default_factory=dict)
+    _decay: float = np.inf
+    _tried: float = np.inf
+    _funnels: Funnels | None = None
+
+    def run(self, wanted: Sequence[int], safety: bool) -> Course:
+        """Extend the flows until all is decided.
+
+        With ``park`` it stops where the (first) flow wants to be restarted, else it restarts and goes on.
+        With ``common`` parked flows are to go on together: one alone is not restarted.
+        """
+        question, end = self.question, self.question.end
+        pending, previous = list(wanted), dict.fromkeys(wanted, np.inf)
+        look, taken, idle = FIRST_LOOK, len(self.flows[-1].steps), 0
+        while self.flows[-1].time < end and not question.deadline.is_over:
+            flow = self.flows[-1]
+            # Behind a step without a proof nothing can be used for a switch; the check has failed on this part.
+            if not flow.advance(end) or not (flow.steps[-1].face_upper <= 0.0).all():
+                break
+            taken += 1
+            if self._parks(flow, end):
+                break
+            flow = self.flows[-1]
+            if taken < look and flow.time < end:
+                continue
+            look = int(taken * 1.25) + LATER_LOOK
+            question.tick(f"t = {flow.time:.3g} s")
+            now = {j: self._gauge(flow, j) for j in pending}
+            self.nearest |= {j: min(self.nearest.get(j, (np.inf, 0.0)), (now[j], flow.time)) for j in pending}
+            pending = [j for j in pending if not now[j] <= 1.0]
+            stalled = all(now[j] > STALLED * previous[j] for j in pending)
+            idle = idle + 1 if stalled else 0
+            if not self._passes(flow, pending, idle, end):
+                self._close(flow, pending)
+            if not pending and (self.tail is not None or not safety):
+                break
+            if stalled and self._settled(flow) and not self._goes_on(flow, pending, end):
+                break
+            previous = {j: now[j] for j in pending}
+        return self
+
+    # -- restarts --------------------------------------------------------------------------------
+
+    def _parks(self, flow: Flow, end: float) -> bool:
+        """Whether the chain stops here to be restarted; where it is not to be parked it is restarted at once."""
+        waits = self.park and self.common
+        if waits and self.question.disturbed and flow.feedback > TOO_MUCH_FEEDBACK:
+            self.parked = True
+            return True
+        if self.question.linear or not flow.wants_restart():
+            return False
+        if waits:
+            self.parked = True
+            return True
+        first = len(self.flows) == 1 and flow.piece.chart.original
+        return self._continued(again(self.question, [flow], first, self.common), end)
+
+    def _continued(self, following: Flow | None, end: float) -> bool:
+        """Go on with another flow if there is one; whether the chain is parked before it."""
+        if following is None:
+            return False
+        if self.park:
+            self.following, self.parked = following, True
+            return True
+        self.flows.append(following)
+        return False
+
+    def _goes_on(self, flow: Flow, pending: Sequence[int], end: float) -> bool:
+        """Whether a chain that has settled outside of its goals is worth following on."""
+        sunk = self._sink(flow, pending)
+        if isinstance(sunk, Sinking) and any(self._arrives(sunk, j) for j in pending):
+            self.tail = sunk
+            return False
+        if flow.frame is not None or self.question.compiled.framed_fields[0].frame is None:
+            return False
+        if self.park and self.common:
+            self.parked = True
+            return False
+        following = again(self.question, [flow], False, self.common)
+        return following is not None and not self._continued(following, end)
+
+    # -- the end of time -------------------------------------------------------------------------
+
+    def _passes(self, flow: Flow, pending: Sequence[int], idle: int, end: float) -> bool:
+        """Whether it is too early for an invariant set: enclosed again, a flow would go on without it."""
+        if not (self.park and pending and self.question.disturbed and flow.time < end):
+            return False
+        return idle < (IDLE_LOOKS if flow.feedback >= RESTART_FEEDBACK else 2)
+
+    def _close(self, flow: Flow, pending: Sequence[int]) -> None:
+        """Look for an invariant set around the end of the flow, where the set has got small enough."""
+        question, size = self.question, set_size(flow)
+        due = flow.time >= self._rest(flow, bool(pending) and question.disturbed)
+        if self.tail is not None or not due or not size < WORTH_A_TAIL * self._tried:
+            return
+        self._tried = size
+        compiled = question.compiled
+        outcome = guarded(
+            "the search for an invariant set",
+            lambda: TailSearch(
+                flow.fields[-1], flow.piece.chart, compiled.w_centre, compiled.w_radius, compiled.loop.names,
+                question.tail_order,
+            ).attempt([flow]),
+            lambda error: TailFailure(stopped(error)),
+        )  # fmt: skip
+        if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
+            self.tail, self._decay = outcome, outcome.decay
+            return
+        self.reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
+        sunk = self._sink(flow, pending) if not pending else None
+        if isinstance(sunk, Sinking):
+            self.tail, self._decay = sunk, sunk.tail().decay
+        elif sunk is not None and sunk.reason.partition(":")[0] not in self.reason:
+            # Not the same again with other numbers.
+            self.reason = f"{self.reason}; no funnel either: {sunk.reason}"
+
+    def _rest(self, flow: Flow, settling: bool) -> float:
+        """From when an invariant set is looked for, seconds: ``settling``, not before the slowest mode has had time."""
+        start = self.question.compiled.fields[-1].start
+        if not settling or flow.time < start:
+            return start
+        slowest = -float(np.linalg.eigvals(flow.slope).real.max())
+        return start + 1.0 / slowest if slowest > 0.0 else start
+
+    def _settled(self, flow: Flow) -> bool:
+        """Whether the slowest mode has had time since the time axis was closed."""
+        if self.tail is None or not np.isfinite(self._decay):
+            return False
+        return flow.time > self.tail.start + SETTLING / self._decay
+
+    def _sink(self, flow: Flow, pending: Sequence[int]) -> Sinking | NoFunnel | None:
+        """A funnel that holds the end of a flow and leads into the pending targets if possible; None: not tried."""
+        question, last = self.question, self.question.compiled.fields[-1]
+        if question.linear or not (last.autonomous and np.isinf(last.end)):
+            return None
+        goals = [question.goals[j] for j in pending]
+        compiled = question.compiled
+
+        def work() -> Sinking | NoFunnel:
+            if self._funnels is None:
+                loop = SettledLoop(last, compiled.w_centre, compiled.w_radius, *flow.piece.unknown_ranges)
+                self._funnels = Funnels(loop, question.deadline)
+            return self._funnels.enter(flow, [goal.region for goal in goals if goal.reset is None])
+
+        return guarded("the search for a funnel", work, lambda error: NoFunnel(stopped(error)))
+
+    def _arrives(self, sinking: Sinking, j: int) -> bool:
+        goal = self.question.goals[j]
+        return goal.reset is None and isinstance(sinking.arrival(goal.region, self.question.end), Arrival)
+
+    def _gauge(self, flow: Flow, j: int) -> float:
+        """Of the end of a flow, in the target of goal j; inf where that takes more than a look."""
+        goal = self.question.goals[j]
+        if goal.reset is not None:
+            return np.inf
+        p, G = flow.state_set(len(flow.steps))
+        n = goal.region.dim
+        return guarded(
+            "a look at a target",
+            lambda: float(goal.region.gauges(flow.bounds, p[None, :n], [G[:, :n]])[0]),
+            lambda error: np.inf,
+        )
+
+
+def again(question: Question, last: Sequence[Flow], first: bool, common: bool) -> Flow | None:
+    """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
+
+    The first holds out longer while the set is large, the second is tighter in the end, and at
+    once where fast and slow modes are far apart (measured on the arm: 5 against 16). None where
+    the restart breaks down at once. ``common``: of one flow too only a box is kept, as of several.
+    """
+    flow, compiled = last[0], question.compiled
+    framed = not first or mode_gap(flow.slope) > WIDE_GAP
+    compact = common and (flow.generation == 0 or filled_share(flow) > 1.0)
+    following = restarted(last, compiled.framed_fields if framed else compiled.fields, compact=compact)
+    started = following is not None and following.time < question.end and following.advance(question.end)
+    if following is not None and started and proved_instants(following) == len(following.steps):
+        return following
+    flow.next_restart = len(flow.steps) + RESTART_STEPS
+    return None

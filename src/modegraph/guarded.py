@@ -1,0 +1,36 @@
+"""An error of the engine costs the answer it was met in, and no other."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TypeVar
+
+from modegraph.errors import ModegraphError
+
+Result = TypeVar("Result")
+
+_LOG = logging.getLogger("modegraph")
+_LOG.addHandler(logging.NullHandler())
+
+
+def stopped(error: Exception) -> str:
+    """What an error of the engine is for a person: a limit that it names, or a fault of its own."""
+    if isinstance(error, ModegraphError):
+        return str(error)
+    return f"the proof engine stopped with {type(error).__name__}: {error}"
+
+
+def note(what: str, error: Exception) -> None:
+    """Log an error of the engine that was met in ``what``, with its traceback."""
+    if not isinstance(error, ModegraphError):
+        _LOG.error("the proof engine stopped in %s", what, exc_info=error)
+
+
+def guarded(what: str, work: Callable[[], Result], otherwise: Callable[[Exception], Result]) -> Result:
+    """The result of ``work``, or of ``otherwise`` where the engine stops, which is logged; ``what`` it was doing."""
+    try:
+        return work()
+    except Exception as error:
+        note(what, error)
+        return otherwise(error)
