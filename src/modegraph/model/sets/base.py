@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -27,15 +27,15 @@ class Set(ABC):
     """
 
     _fields: ClassVar[tuple[str, ...]]
+    _parametrised: ClassVar[Callable[..., Any]]
+    """ParametrisedSet: its file imports this one, and the folder's ``__init__`` imports both."""
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Any:
         """Traced numbers (``start`` of a continuous class of references) make a ParametrisedSet instead."""
         from modegraph.expression.array import is_traced
 
         if is_traced([*args, *kwargs.values()]):
-            from modegraph.model.sets.parametrised import ParametrisedSet
-
-            return ParametrisedSet(cls, args, kwargs)
+            return Set._parametrised(cls, args, kwargs)
         return super().__new__(cls)
 
     @property
