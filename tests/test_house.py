@@ -80,4 +80,23 @@ def test_import_is_light() -> None:
 def test_examples_ship_with_the_package() -> None:
     config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert config["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"examples": "modegraph/examples"}
-    assert config["project"]["version"] == modegraph.__version__
+
+
+def test_the_version_stands_in_one_place() -> None:
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "version" not in config["project"]
+    assert config["project"]["dynamic"] == ["version"]
+    source = ROOT / config["tool"]["hatch"]["version"]["path"]
+    assert source == SOURCE / "__init__.py"
+    assert re.findall(r'^__version__ = "(.+)"$', source.read_text(encoding="utf-8"), re.MULTILINE) == [
+        modegraph.__version__
+    ]
+    assert f"What will be {modegraph.__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_every_commit_is_checked_as_make_lint_does() -> None:
+    """The hooks are those of the Makefile, from the same tools."""
+    recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nlint:")[2].partition("\n\n")[0]
+    hooks = re.findall(r"entry: (.+)", (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))
+    assert hooks == [line.strip().replace("$(BIN)", ".venv/bin") for line in recipe.splitlines()[1:]]
+    assert len(hooks) == 3
