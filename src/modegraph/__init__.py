@@ -8,16 +8,17 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from modegraph import api  # noqa: F401  the methods that classes take when they are made
 from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
 
 if TYPE_CHECKING:
     from modegraph.certify.largest_start import largest_start
     from modegraph.certify.references import References
     from modegraph.certify.verdict import Status, Verdict, Witness
+    from modegraph.explain.explanation import Explanation
+    from modegraph.explain.repairs import Repair
     from modegraph.graph.build import build
-    from modegraph.graph.explanation import Explanation
     from modegraph.graph.modegraph import ModeGraph
-    from modegraph.graph.repairs import Repair
     from modegraph.graph.submodes import Submode
     from modegraph.graph.switch import Switch
     from modegraph.model.memory import Memory
@@ -80,7 +81,7 @@ _HOME = {
     "Ball": "model.sets.ball",
     "Box": "model.sets.box",
     "Ellipsoid": "model.sets.ellipsoid",
-    "Explanation": "graph.explanation",
+    "Explanation": "explain.explanation",
     "Memory": "model.memory",
     "Mode": "model.mode",
     "ModeGraph": "graph.modegraph",
@@ -88,7 +89,7 @@ _HOME = {
     "Points": "model.reference",
     "Polytope": "model.sets.polytope",
     "References": "certify.references",
-    "Repair": "graph.repairs",
+    "Repair": "explain.repairs",
     "Run": "run.simulate",
     "Status": "certify.verdict",
     "Sublevel": "model.sets.sublevel",

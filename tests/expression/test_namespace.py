@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from modegraph.expression import Graph, TracedArray
-from modegraph.expression.namespace import _TracedModule, paused, tracing
+from modegraph.expression.depth import paused
+from modegraph.expression.namespace import _TracedModule, tracing
 
 
 def test_undone_even_after_an_error() -> None:

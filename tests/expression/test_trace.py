@@ -119,9 +119,7 @@ def test_bad_vectors(value: Any, words: str) -> None:
     assert str(caught.value).startswith("mode 'm', controller")
 
 
-def test_tracing_is_quick() -> None:
-    import time
-
+def test_tracing_makes_few_nodes() -> None:
     def arm(x: Any) -> Any:
         q, w = x[:2], x[2:]
         c, s = np.cos(q[1]), np.sin(q[1])
@@ -130,10 +128,6 @@ def test_tracing_is_quick() -> None:
         v = -16 * q - 8 * w
         return np.concatenate([w, np.linalg.solve(m, m @ v + k @ w - k @ w)])
 
-    times = []
-    for _ in range(5):
-        x = TracedArray(Graph().variables("abcd"))
-        begin = time.perf_counter()
-        traced(arm, x=x)
-        times.append(time.perf_counter() - begin)
-    assert min(times) < 0.01
+    graph = Graph()
+    traced(arm, x=TracedArray(graph.variables("abcd")))
+    assert len(graph.nodes) < 80

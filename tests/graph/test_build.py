@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from modegraph import deadline as deadline_module
 from modegraph.certify.unit import UnitResult
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.deadline import Deadline
@@ -20,6 +21,7 @@ from modegraph.model.target import Target
 from tests.graph.fakes import PLANT, certified, mode
 
 Engine = Any
+BEGUN = 1000.0
 SETTLED = Verdict(Status.CERTIFIED, "for all time")
 
 
@@ -31,6 +33,28 @@ def engine(monkeypatch: pytest.MonkeyPatch) -> Any:
         monkeypatch.setattr(build_module, "certify_unit", function)
 
     return install
+
+
+class Clock:
+    """Stands for the module ``time`` of the deadlines; it goes on only where a unit says how long it works."""
+
+    def __init__(self) -> None:
+        self.now = BEGUN
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def work(self, deadline: Deadline) -> None:
+        """Work until a deadline, and see that it is over."""
+        self.now += max(0.0, deadline.left)
+        assert deadline.is_over
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr(deadline_module, "time", made)
+    return made
 
 
 def everything(mode: Any, p: Any, targets: Any, **_: Any) -> UnitResult:
@@ -98,22 +122,21 @@ def test_a_wrong_model_is_an_error(engine: Engine) -> None:
         build([mode("a"), mode("b")])
 
 
-def test_the_budget_ends(engine: Engine) -> None:
+def test_the_budget_ends(engine: Engine, clock: Clock) -> None:
     def fake(mode: Any, p: Any, targets: Any, *, deadline: Deadline, **_: Any) -> UnitResult:
-        time.sleep(max(0.0, deadline.left))
+        clock.work(deadline)
         return everything(mode, p, targets)
 
     engine(fake)
-    began = time.monotonic()
-    g = build([mode(f"m{k}") for k in range(6)], budget=0.3)
-    assert time.monotonic() - began < 2.0
+    g = build([mode(f"m{k}") for k in range(6)], budget=600.0)
+    assert clock.now == pytest.approx(BEGUN + 600.0)
     assert {g.verdict(i, j).status for i in g.modes for j in g.modes if i != j} <= {
         Status.CERTIFIED,
         Status.UNDECIDED,
     }
 
 
-def test_every_unit_gets_its_share_of_the_budget(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_unit_gets_its_share_of_the_budget(engine: Engine, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(build_module, "COUNT", 2)
     shares = []
 
@@ -123,8 +146,47 @@ def test_every_unit_gets_its_share_of_the_budget(engine: Engine, monkeypatch: py
 
     engine(fake)
     build([mode(f"m{k}") for k in range(6)], budget=60.0)
-    assert min(shares) > 19.0
-    assert max(shares) <= 60.0
+    # Three rounds of two, and no time goes by.
+    assert sorted(shares) == [20.0, 20.0, 30.0, 30.0, 60.0, 60.0]
+
+
+def test_what_its_share_cut_short_is_done_once_more(
+    engine: Engine, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One unit needs more than its share; the others leave it enough: no answer depends on the share."""
+    monkeypatch.setattr(build_module, "COUNT", 1)
+    asked: list[str] = []
+
+    def fake(mode: Any, p: Any, targets: Any, *, deadline: Deadline, **_: Any) -> UnitResult:
+        asked.append(mode.name)
+        if mode.name == "m1" and deadline.left < 100.0:
+            clock.work(deadline)
+            nothing = Verdict(Status.UNDECIDED, "the budget ended")
+            return UnitResult([certified(), *[nothing] * (len(targets) - 1)], nothing)
+        return everything(mode, p, targets)
+
+    engine(fake)
+    g = build([mode(f"m{k}") for k in range(4)], budget=240.0)
+    assert asked.count("m1") == 2
+    assert sum(asked.count(f"m{k}") for k in (0, 2, 3)) == 3
+    assert all(g.verdict("m1", j).status is Status.CERTIFIED for j in ("m0", "m2", "m3"))
+    assert g.check("m1").status is Status.CERTIFIED
+
+
+def test_when_the_budget_is_over_nothing_is_done_again(
+    engine: Engine, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build_module, "COUNT", 1)
+    asked: list[str] = []
+
+    def fake(mode: Any, p: Any, targets: Any, *, deadline: Deadline, **_: Any) -> UnitResult:
+        asked.append(mode.name)
+        clock.work(deadline)
+        return UnitResult([Verdict(Status.UNDECIDED, "late") for _ in targets], Verdict(Status.UNDECIDED, "late"))
+
+    engine(fake)
+    build([mode("a"), mode("b")], budget=10.0)
+    assert sorted(asked) == ["a", "b"]
 
 
 def test_an_interrupt_keeps_what_was_decided(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:

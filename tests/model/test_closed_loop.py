@@ -1,7 +1,6 @@
 """Tracing of whole modes: what comes out, and every kind of bad input."""
 
 import math
-import time
 from fractions import Fraction
 
 import numpy as np
@@ -206,12 +205,11 @@ def two_link_arm(reference):
     )
 
 
-def test_the_two_link_arm_is_traced_in_milliseconds():
+def test_the_two_link_arm_is_traced_with_little_work():
     mode = two_link_arm(mg.minimum_time([0, 1.6], [1, 0.8], speed=1.25, acceleration=5.0))
-    close_loop(mode)
-    begun = time.perf_counter()
     loop = close_loop(mode)
-    assert time.perf_counter() - begun < 0.1  # .012 s on a quiet machine
+    # 12 ms on a quiet machine: what takes time is the nodes.
+    assert len(loop.graph.nodes) < 400
     assert len(loop.segments) == 4
     assert [face.name for face in loop.segments[0].constraints[-2:]] == ["u[1]", "u[1]"]
     # Computed torque leaves the double integrator of the error.

@@ -378,17 +378,17 @@ ENGINE_FAULTS = (
     ),
     Fault(
         "a repair is told that no build confirms",
-        "graph/repairs.py",
+        "explain/repairs.py",
         "            if verdict.status is Status.CERTIFIED:\n                tried = (",
         "            if verdict.reason:\n                tried = (",
-        ("tests/graph/test_explanation.py::test_what_build_does_not_confirm_is_not_told",),
+        ("tests/explain/test_explain.py::test_what_build_does_not_confirm_is_not_told",),
     ),
     Fault(
         "a repair leaves the modes as they are",
-        "graph/pair.py",
+        "explain/pair.py",
         "modes=tuple(places.get(m.name, m) for m in self.modes)",
         "modes=self.modes",
-        ("tests/graph/test_explanation.py::test_a_horizon_too_short_with_all_three_repairs",),
+        ("tests/explain/test_explain.py::test_a_horizon_too_short_with_all_three_repairs",),
     ),
     Fault(
         "start sets of a class are as large as at its corners",

@@ -9,15 +9,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.attach import with_methods
 from modegraph.certify.references import Parameter, match_parameter
 from modegraph.certify.relation import Relation
 from modegraph.errors import ModegraphError
 from modegraph.model.sets import Box
+
+if TYPE_CHECKING:
+    from modegraph import api
 
 Floats = NDArray[np.float64]
 Side = Box | tuple[Parameter, ...]
@@ -52,6 +56,7 @@ class ProductCell:
     target: Side
 
 
+@with_methods
 class ContinuousReferences:
     """The certified pairs (r_i, r_j) of one switch, at least one of the classes being continuous.
 
@@ -63,6 +68,9 @@ class ContinuousReferences:
         Products of these are certified: Boxes of parameters, or members of a finite class (inner
         descriptions of the projections, from ``cells``).
     """
+
+    if TYPE_CHECKING:  # from upper layers
+        plot = api.plot_references
 
     def __init__(self, source: Side, target: Side, relations: dict[tuple[int, int], Relation], same: bool) -> None:
         """``relations[a, b]``: of member a with member b (0 for a continuous class); ``same``: i = j."""
@@ -242,17 +250,6 @@ class ContinuousReferences:
         source, target = self._split(z)
         left = _members(self._source, source, key[0])
         return list(zip(left, _members(self._target, target, key[1]), strict=True))
-
-    def plot(self, ax: Any = None, *, r_i: Any = None, r_j: Any = None, dims: tuple[int, ...] | None = None) -> Any:
-        """Draw which references are certified, undecided and refuted; returns the axes.
-
-        Two classes of one parameter each are drawn against each other. Otherwise the map is over one or two
-        parameters (``dims``) of the target, for the source's reference ``r_i``; or over those of the source,
-        where ``r_j`` is given. What is not given is in the middle of its class.
-        """
-        from modegraph.report.references import plot_references
-
-        return plot_references(self, ax, r_i, r_j, dims)
 
     # -- shape -----------------------------------------------------------------------------------
 

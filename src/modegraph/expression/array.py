@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.errors import ModegraphError
+from modegraph.expression.protocol import RULES
 from modegraph.expression.relation import Relation
 from modegraph.expression.scalar import Expr, Graph
 
@@ -22,14 +23,10 @@ class TracedArray(np.ndarray[Any, Any]):
         return nested(values).view(cls)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
-        from modegraph.expression.ufuncs import apply
-
-        return apply(ufunc, method, inputs, kwargs)
+        return RULES.ufunc(ufunc, method, inputs, kwargs)
 
     def __array_function__(self, func: Callable[..., Any], types: Any, args: Any, kwargs: Any) -> Any:
-        from modegraph.expression.arrayfunctions import apply
-
-        return apply(func, args, kwargs)
+        return RULES.function(func, args, kwargs)
 
     def __setitem__(self, key: Any, value: Any) -> None:
         if isinstance(value, (list, tuple, np.ndarray)):

@@ -11,6 +11,8 @@ from modegraph.errors import ModegraphError
 from modegraph.expression import linear
 from modegraph.expression.array import Objects, TracedArray, as_numbers, graph_of, is_traced, nested, wrap
 from modegraph.expression.conditional import choose
+from modegraph.expression.depth import paused
+from modegraph.expression.protocol import RULES
 from modegraph.expression.relation import Relation
 from modegraph.expression.scalar import Expr
 from modegraph.expression.ufuncs import clip, lift, unsupported
@@ -116,8 +118,6 @@ PASSED: frozenset[Callable[..., Any]] = frozenset(
 
 def apply(func: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
     """`__array_function__` of `Expr`, `TracedArray` and `Relation`."""
-    from modegraph.expression.namespace import paused
-
     with paused():
         if func in HANDLERS and (is_traced([args, kwargs]) or func in _ALWAYS):
             return HANDLERS[func](*args, **kwargs)
@@ -135,6 +135,8 @@ def apply(func: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any
         except ValueError as error:
             raise ModegraphError(f"np.{func.__name__}: {error}") from error
 
+
+RULES.function = apply
 
 _ALWAYS = frozenset((np.zeros_like, np.ones_like, np.empty_like, np.full_like))
 

@@ -21,17 +21,13 @@ import numpy.linalg
 
 from modegraph.expression.array import TracedArray, is_traced, nested, wrap
 from modegraph.expression.arrayfunctions import HANDLERS, PASSED, filled
+from modegraph.expression.depth import STATE
 from modegraph.expression.ufuncs import BINARY, UNARY
 
 _LIBRARIES = frozenset(("numpy", "scipy", "numba", "modegraph", "flint", "matplotlib", "sympy", "pandas", "llvmlite"))
 _FLOATS = (None, float, np.float64, object, "float", "float64", "d")
 
 
-class _State(threading.local):
-    depth = 0
-
-
-_state = _State()
 _lock = threading.Lock()
 _tracers = 0
 
@@ -140,7 +136,7 @@ class _TracedModule(ModuleType):
     def __getattribute__(self, name: str) -> Any:
         # Not by super(): another thread may have ended the last trace, and the module is a plain one again.
         original = ModuleType.__getattribute__(self, name)
-        if not _state.depth:
+        if not STATE.depth:
             return original
         replacement = _TABLES[ModuleType.__getattribute__(self, "__name__")].get(name)
         if replacement is None:
@@ -157,23 +153,13 @@ def tracing() -> Iterator[None]:
         _tracers += 1
         for module in (np, numpy.linalg):
             module.__class__ = _TracedModule
-    _state.depth += 1
+    STATE.depth += 1
     try:
         yield
     finally:
-        _state.depth -= 1
+        STATE.depth -= 1
         with _lock:
             _tracers -= 1
             if not _tracers:
                 for module in (np, numpy.linalg):
                     module.__class__ = ModuleType
-
-
-@contextmanager
-def paused() -> Iterator[None]:
-    """NumPy as it is, for the library's own use inside a trace."""
-    depth, _state.depth = _state.depth, 0
-    try:
-        yield
-    finally:
-        _state.depth = depth

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from modegraph.errors import ModegraphError
 from modegraph.expression.graph import NONNEGATIVE
 from modegraph.expression.ops import ADDC, MULC
+from modegraph.expression.protocol import RULES
 
 if TYPE_CHECKING:
     from modegraph.expression.scalar import Expr, Graph
@@ -77,9 +78,7 @@ class Relation:
         self._refuse()
 
     def __array_function__(self, func: Callable[..., Any], types: Any, args: Any, kwargs: Any) -> Any:
-        from modegraph.expression.arrayfunctions import apply
-
-        return apply(func, args, kwargs)
+        return RULES.function(func, args, kwargs)
 
 
 def _square_root_of(graph: Graph, index: int) -> int | None:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from numbers import Rational
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -36,10 +36,9 @@ from modegraph.expression.ops import (
     VAR,
     WHERE,
 )  # fmt: skip
+from modegraph.expression.protocol import RULES
+from modegraph.expression.relation import Relation
 from modegraph.expression.text import render
-
-if TYPE_CHECKING:
-    from modegraph.expression.relation import Relation
 
 Number = int | float | Fraction
 
@@ -296,8 +295,6 @@ class Expr:
         return self._relation(other, swap=True, strict=True)
 
     def _relation(self, other: object, *, swap: bool, strict: bool) -> Relation:
-        from modegraph.expression.relation import Relation
-
         if isinstance(other, (float, np.floating)) and math.isinf(other):
             raise ModegraphError(f"{self.text()} is compared with infinity; leave an unbounded limit out")
         right = self._lift(other)
@@ -348,14 +345,10 @@ class Expr:
     __round__ = __floor__ = __ceil__ = __trunc__ = _refuse_rounding
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
-        from modegraph.expression.ufuncs import apply
-
-        return apply(ufunc, method, inputs, kwargs)
+        return RULES.ufunc(ufunc, method, inputs, kwargs)
 
     def __array_function__(self, func: Callable[..., Any], types: Any, args: Any, kwargs: Any) -> Any:
-        from modegraph.expression.arrayfunctions import apply
-
-        return apply(func, args, kwargs)
+        return RULES.function(func, args, kwargs)
 
     # NumPy calls these on the elements of plain object arrays.
     def sqrt(self) -> Expr:

@@ -13,6 +13,7 @@ import numpy as np
 from modegraph.errors import ModegraphError
 from modegraph.expression import functions
 from modegraph.expression.array import Objects, as_numbers, graph_of, is_traced, nested, plain, wrap
+from modegraph.expression.protocol import RULES
 from modegraph.expression.relation import Relation
 from modegraph.expression.scalar import Expr, Graph
 
@@ -121,6 +122,9 @@ def apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: dict[st
         kwargs.pop("dtype", None)
         result = _traced(ufunc, method, inputs, kwargs)
     return result if out is None else _store(out[0] if isinstance(out, tuple) else out, result)
+
+
+RULES.ufunc = apply
 
 
 def _store(target: Any, result: Any) -> Any:

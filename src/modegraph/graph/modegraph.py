@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from modegraph.attach import with_methods
 from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.references import Cell, Parameter, References
 from modegraph.certify.verdict import Status, Verdict
@@ -24,13 +25,13 @@ from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 
 if TYPE_CHECKING:
-    from modegraph.graph.explanation import Explanation
-    from modegraph.plan.plan import Plan
+    from modegraph import api
 
 Node = tuple[str, int]
 """A mode and the position of one reference in its class (0 for a Target)."""
 
 
+@with_methods
 class ModeGraph:
     """Which modes can be chained, with proofs. Made by ``modegraph.build``.
 
@@ -47,6 +48,14 @@ class ModeGraph:
     horizon : float or None
         Seconds, as given to ``build``.
     """
+
+    if TYPE_CHECKING:  # from upper layers
+        plan = api.plan
+        plans = api.plans
+        explain = api.explain
+        plot = api.plot_graph
+        save = api.save_graph
+        load = classmethod(api.load_graph)
 
     def __init__(
         self,
@@ -165,30 +174,6 @@ class ModeGraph:
             return self._checks[name, 0]
         return every_member([(self._parameters[name][a], self._checks[name, a]) for a in self.indices(name, r)])
 
-    def explain(
-        self, i: str | Mode, j: str | Mode | Target, r_i: Any = None, r_j: Any = None, *, seconds: float = 30.0
-    ) -> Explanation:
-        """Why there is, or is not, a switch i -> j, and for an absent one which changes were proved to give it.
-
-        Without references it is about the pair that decides the verdict: the certified one with the least
-        margin, or the one that comes closest.
-
-        Parameters
-        ----------
-        seconds : float
-            Of work on what the proofs of ``build`` have not shown yet, above all on repairs. What is not
-            found by then is left out, and said to be.
-
-        Raises
-        ------
-        ModegraphError
-            As for ``verdict``, or if ``seconds`` is not a number >= 0.
-        """
-        from modegraph.graph.explain import explained
-
-        source, target = self.name_of(i), self.name_of(j)
-        return explained(self, source, target, self.verdict(source, target, r_i, r_j), r_i, r_j, seconds)
-
     def deciding(self, i: str, j: str, r_i: Any, r_j: Any) -> Case | None:
         """The pair of references that the verdict on i -> j speaks of; None where there is none."""
         if not self._classes.involves(i, j):
@@ -202,75 +187,6 @@ class ModeGraph:
             for name, a, p in zip((i, j), best[0], best[1:3], strict=True)
         ]
         return sides[0], sides[1], self._class_verdict(i, j, r_i, r_j)
-
-    def plan(
-        self,
-        start: str | Mode | None = None,
-        goal: str | Mode | Target | None = None,
-        *,
-        minimize: str | Mapping[str, float] = "switches",
-        r_start: Any = None,
-        r_goal: Any = None,
-        x0: Any = None,
-        via: Sequence[str | Mode] = (),
-        avoid: Sequence[str | Mode | Target] = (),
-        max_switches: int | None = None,
-    ) -> Plan:
-        """The best chain of certified switches from ``start`` (or from the state ``x0``) to ``goal``.
-
-        Ties are broken by fewer switches, then smaller latest time, then mode order.
-
-        Parameters
-        ----------
-        start : str or Mode, optional
-            The mode that runs at first. Without it, any mode that ``x0`` allows to enter.
-        goal : str, Mode or Target
-            Where to end. If it is also the start, one mode at no cost, unless ``r_start`` and
-            ``r_goal`` differ.
-        minimize : {"switches", "time", "energy", "margin"} or mapping
-            Worst-case time, worst-case energy, largest bottleneck margin; or non-negative weights
-            by "switches", "time", "energy".
-        r_start, r_goal : reference, optional
-            Fix the reference of the first and the last mode.
-        x0 : (n,) array, optional
-            The state at the beginning; it must lie in the first mode's start set.
-        via : sequence of modes
-            To be visited in this order; a mode left in zero time does not count.
-        avoid : sequence of modes
-            Never entered. (A start mode is not entered: it runs already.)
-        max_switches : int, optional
-
-        Raises
-        ------
-        Unreachable
-            If no chain of certified switches does it.
-        ModegraphError
-            If the question makes no sense.
-        """
-        return self.plans(
-            1,
-            start,
-            goal,
-            minimize=minimize,
-            r_start=r_start,
-            r_goal=r_goal,
-            x0=x0,
-            via=via,
-            avoid=avoid,
-            max_switches=max_switches,
-        )[0]
-
-    def plans(
-        self, k: int, start: str | Mode | None = None, goal: str | Mode | Target | None = None, **options: Any
-    ) -> list[Plan]:
-        """The ``k`` best plans, best first; fewer if there are no more. Options as for ``plan``.
-
-        Two plans differ in their modes or references. None visits the same mode with the same
-        reference twice, except where ``via`` makes it.
-        """
-        from modegraph.plan.planner import plans
-
-        return plans(self, k, start, goal, **options)
 
     def modes_at(self, x: Any) -> list[tuple[str, References | ContinuousReferences]]:
         """The modes and targets that may be entered from the state ``x`` (n,) now.
@@ -319,12 +235,6 @@ class ModeGraph:
             )
         return graph
 
-    def plot(self, ax: Any = None) -> Any:
-        """Draw modes and certified switches; returns the matplotlib axes."""
-        from modegraph.report.plots import plot_graph
-
-        return plot_graph(self, ax)
-
     def add(self, mode: Mode | Target) -> NoReturn:
         raise NotBuiltYet("adding a mode to a graph is not built yet: call build again with all modes")
 
@@ -333,13 +243,6 @@ class ModeGraph:
 
     def remove(self, name: str) -> NoReturn:
         raise NotBuiltYet("removing a mode from a graph is not built yet: call build again without it")
-
-    def save(self, path: Any) -> NoReturn:
-        raise NotBuiltYet("saving a graph is not built yet")
-
-    @classmethod
-    def load(cls, path: Any) -> NoReturn:
-        raise NotBuiltYet("loading a graph is not built yet")
 
     def __repr__(self) -> str:
         return f"ModeGraph({len(self._modes)} modes, {len(self.switches)} certified switches)"

@@ -8,21 +8,23 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
+from modegraph.attach import with_methods
 from modegraph.certify.proof import only_entered
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.verdict import Status, Verdict
-from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.switch import Switch
 from modegraph.model.target import Target
+from modegraph.plan.as_json import json_text, plan_data
 from modegraph.plan.objectives import Cost, Objective
 
 if TYPE_CHECKING:
+    from modegraph import api
     from modegraph.graph.modegraph import ModeGraph
-    from modegraph.run.simulate import Run
 
 
+@with_methods
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A chain of certified switches.
@@ -51,6 +53,12 @@ class Plan:
     x0 : (n,) array or None
         The state the plan was asked for.
     """
+
+    if TYPE_CHECKING:  # from upper layers
+        simulate = api.simulate
+        supervisor = api.supervisor
+        export_c = api.export_c
+        plot = api.plot_plan
 
     modes: list[str]
     references: list[Parameter]
@@ -116,47 +124,8 @@ class Plan:
         """How much a better choice of references might still save: cost - bound."""
         return self.cost - self.bound if math.isfinite(self.cost) else 0.0
 
-    def simulate(self, x0: Any = None, plant: Any = None, force: bool = False, *, stay: float | None = None) -> Run:
-        """Integrate the real closed loop with its switching logic; see ``modegraph.run.simulate``.
-
-        Parameters
-        ----------
-        x0 : (n,) array
-            By default the state the plan was asked for.
-        plant : System or callable(t, x, u), optional
-            What really happens; by default the model of each mode, with disturbance and unknowns at
-            the centre of their ranges.
-        force : bool
-            Also from an ``x0`` outside the first start set, for which nothing is certified.
-        stay : float, optional
-            Seconds in the goal mode; by default until it has settled.
-        """
-        from modegraph.run.simulate import simulate
-
-        if x0 is None:
-            x0 = self.x0
-        if x0 is None:
-            raise ModegraphError("simulate: give x0, the state at the beginning")
-        modes = [self.graph.modes[name] for name in self.modes]
-        times = [s.time for s in self.switches]
-        return simulate(modes, self.references, times, x0, plant=plant, force=force, stay=stay)
-
-    def supervisor(self) -> NoReturn:
-        raise NotBuiltYet("Plan.supervisor is not built yet; use Plan.simulate")
-
-    def export_c(self, folder: Any) -> NoReturn:
-        raise NotBuiltYet("Plan.export_c is not built yet")
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the certified time line of the plan; returns the matplotlib axes."""
-        from modegraph.report.plots import plot_plan
-
-        return plot_plan(self, ax)
-
     def to_json(self) -> str:
         """The plan as JSON text with the attribute names as keys; what is unknown is null."""
-        from modegraph.plan.as_json import json_text, plan_data
-
         return json_text(plan_data(self))
 
     def __str__(self) -> str:

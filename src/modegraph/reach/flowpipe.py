@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from modegraph.attach import with_methods
 from modegraph.cores import in_parallel, one_core
 from modegraph.deadline import NEVER, Deadline
 from modegraph.errors import ModegraphError
@@ -26,6 +27,9 @@ from modegraph.reach.flow.flow import Order
 from modegraph.reach.restrictor import Restrictor
 from modegraph.reach.slices import Slice, Slicer, hull, outline
 from modegraph.reach.start.piece import Piece
+
+if TYPE_CHECKING:
+    from modegraph import api
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +49,7 @@ DEFAULT_HORIZON = 10.0
 """Seconds, for a set-point mode without a horizon."""
 
 
+@with_methods
 class Flowpipe:
     """An enclosure of all trajectories of one mode under one reference, or a class of them. Made by :func:`flowpipe`.
 
@@ -63,6 +68,9 @@ class Flowpipe:
     pieces, steps : int
         Parts the start set was cut into, at the start or on the way, and validated steps of all of them.
     """
+
+    if TYPE_CHECKING:  # from upper layers
+        plot = api.plot_flowpipe
 
     def __init__(
         self,
@@ -180,7 +188,7 @@ class Flowpipe:
         (float, list of (k, 2) arrays)
             The instant, and one polygon around each part; together they hold every state that is possible.
         """
-        pair = self._dims(dims)
+        pair = self.state_numbers(dims)
         if pair is None or len(pair) != 2:
             raise ModegraphError(f"{self._label}: flowpipe.sections: dims takes two states")
         instant = float(self.times[np.argmin(np.abs(self.times - self._instant(t, "t")))])
@@ -191,30 +199,8 @@ class Flowpipe:
                 found.append(outline(slicer, k, (pair[0], pair[1])))
         return instant, found
 
-    def plot(
-        self,
-        ax: Any = None,
-        dims: int | str | Sequence[int | str] | None = None,
-        *,
-        sections: Sequence[float] | None = None,
-        target: Set | None = None,
-    ) -> Any:
-        """Draw the boxes of the flowpipe and return the axes.
-
-        Parameters
-        ----------
-        dims : state number(s) or name(s), optional
-            One state: over time. Two: the phase plane. None: all states over time.
-        sections : seconds, optional
-            In the phase plane: outlines of the reach set at these instants, instead of all boxes.
-        target : Set, optional
-            To be drawn too: its outline in the phase plane, or its range over time.
-        """
-        from modegraph.report.flowpipes import plot_flowpipe
-
-        return plot_flowpipe(self, ax, self._dims(dims), sections, target)
-
-    def _dims(self, dims: int | str | Sequence[int | str] | None) -> tuple[int, ...] | None:
+    def state_numbers(self, dims: int | str | Sequence[int | str] | None) -> tuple[int, ...] | None:
+        """Numbers of one or two states given by number or name, for drawing; None stays None."""
         if dims is None:
             return None
         listed = [dims] if isinstance(dims, int | np.integer | str) else list(dims)

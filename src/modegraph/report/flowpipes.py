@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from modegraph.reach.flowpipe import Flowpipe
 
 
-def plot_flowpipe(
+def draw_flowpipe(
     pipe: Flowpipe,
     ax: Any = None,
     dims: tuple[int, ...] | None = None,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from modegraph.run.simulate import Run
 
 
-def plot_graph(graph: ModeGraph, ax: Any = None) -> Any:
+def draw_graph(graph: ModeGraph, ax: Any = None) -> Any:
     """Modes on a circle, an arrow for every certified switch; zero-time switches dashed."""
     ax = _axes(ax, (6.0, 6.0))
     names = list(graph.modes)
@@ -53,7 +53,7 @@ def plot_graph(graph: ModeGraph, ax: Any = None) -> Any:
     return ax
 
 
-def plot_plan(plan: Plan, ax: Any = None) -> Any:
+def draw_plan(plan: Plan, ax: Any = None) -> Any:
     """For each mode, from when at the earliest to when at the latest it is entered and left."""
     ax = _axes(ax, (7.0, 0.6 + 0.5 * len(plan.modes)))
     earliest = latest = 0.0
@@ -76,7 +76,7 @@ def plot_plan(plan: Plan, ax: Any = None) -> Any:
     return ax
 
 
-def plot_run(run: Run, ax: Any = None) -> Any:
+def draw_run(run: Run, ax: Any = None) -> Any:
     """States and inputs over time, a coloured band for each mode, switch instants dotted.
 
     With ``ax`` given, only the states, into it. Returns the axes: one, or an array of two.

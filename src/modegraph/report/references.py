@@ -18,7 +18,7 @@ FINE = 240
 COLOURS = {1: ("tab:green", "certified"), 0: ("lightgray", "undecided"), -1: ("tab:red", "refuted")}
 
 
-def plot_references(refs: ContinuousReferences, ax: Any, r_i: Any, r_j: Any, dims: tuple[int, ...] | None) -> Any:
+def draw_references(refs: ContinuousReferences, ax: Any, r_i: Any, r_j: Any, dims: tuple[int, ...] | None) -> Any:
     """A map over one or two parameters; see ``ContinuousReferences.plot``."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch

@@ -13,7 +13,7 @@ from modegraph.model.target import Target
 from modegraph.plan.as_json import switch_data, verdict_data
 
 if TYPE_CHECKING:
-    from modegraph.graph.explanation import Explanation
+    from modegraph.explain.explanation import Explanation
     from modegraph.graph.modegraph import ModeGraph
     from modegraph.run.simulate import Run
 

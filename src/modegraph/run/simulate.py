@@ -6,17 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.attach import with_methods
 from modegraph.certify.references import Parameter
 from modegraph.errors import ModegraphError
 from modegraph.graph.entry import Entry, plain_state
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 from modegraph.run.live import Live, Plant
+
+if TYPE_CHECKING:
+    from modegraph import api
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +45,7 @@ class Violation:
     constraint: str
 
 
+@with_methods
 @dataclass(frozen=True, eq=False)
 class Run:
     """One execution of a plan. There are two samples at each switch instant, before and after it.
@@ -87,11 +92,8 @@ class Run:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
 
-    def plot(self, ax: Any = None) -> Any:
-        """Draw states and inputs over time; with ``ax``, only the states. Returns the axes."""
-        from modegraph.report.plots import plot_run
-
-        return plot_run(self, ax)
+    if TYPE_CHECKING:  # from upper layers
+        plot = api.plot_run
 
 
 def simulate(

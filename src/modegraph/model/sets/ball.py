@@ -62,7 +62,7 @@ class Ball(Set):
     def _draw(self, n: int, rng: np.random.Generator) -> Floats:
         return self.c + self.radius * points_in_unit_ball(n, self.dim, rng)
 
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         return self.c[list(dims)] + self.radius * unit_circle()
 
 

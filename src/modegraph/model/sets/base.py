@@ -3,39 +3,44 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from modegraph.attach import with_methods
 from modegraph.errors import ModegraphError
 from modegraph.model.sets import exact
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from modegraph import api
 
 Floats = NDArray[np.float64]
 Face = tuple[exact.Row, Fraction]
 
 
+@with_methods
 class Set(ABC):
     """A closed set of states, inputs or disturbances, convex unless it is a Sublevel; its doubles are exact numbers.
 
     Sets are immutable: their arrays are read-only copies of what was given.
     """
 
+    if TYPE_CHECKING:  # from upper layers
+        plot = api.plot_set
+
     _fields: ClassVar[tuple[str, ...]]
+    _parametrised: ClassVar[Callable[..., Any]]
+    """ParametrisedSet: its file imports this one, and the folder's ``__init__`` imports both."""
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Any:
         """Traced numbers (``start`` of a continuous class of references) make a ParametrisedSet instead."""
         from modegraph.expression.array import is_traced
 
         if is_traced([*args, *kwargs.values()]):
-            from modegraph.model.sets.parametrised import ParametrisedSet
-
-            return ParametrisedSet(cls, args, kwargs)
+            return Set._parametrised(cls, args, kwargs)
         return super().__new__(cls)
 
     @property
@@ -65,7 +70,7 @@ class Set(ABC):
         """n points, (n, dim), in the set up to rounding."""
 
     @abstractmethod
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         """Corners, (k, 2) in order, of the projection onto two coordinates, for drawing."""
 
     def settle(self, *dims: int) -> None:  # noqa: B027
@@ -124,23 +129,6 @@ class Set(ABC):
                 f"{self!r} is so thin that no point with double coordinates was found in it; "
                 "give it some thickness, or use a Box with lo = hi in the thin coordinate"
             )
-
-    def plot(self, ax: Axes | None = None, dims: tuple[int, int] = (0, 1), **style: Any) -> Axes:
-        """Draw the projection onto two coordinates (an interval when there is one) and return the axes."""
-        import matplotlib.pyplot as plt
-        from matplotlib.patches import Polygon
-
-        if ax is None:
-            ax = plt.subplots()[1]
-        if self.dim == 1:
-            (lo,), (hi,) = self.bounding_box()
-            ax.plot([lo, hi], [0.0, 0.0], **style)
-            return ax
-        if len(dims) != 2 or any(not 0 <= k < self.dim for k in dims):
-            raise ModegraphError(f"plot: dims={dims!r} must be two coordinates out of 0..{self.dim - 1}")
-        ax.add_patch(Polygon(self._outline(dims), closed=True, **{"fill": False, **style}))
-        ax.autoscale_view()
-        return ax
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and all(

@@ -81,6 +81,6 @@ class Box(Set):
         weight = rng.random((n, self.dim))
         return np.clip(self.lo * (1.0 - weight) + self.hi * weight, self.lo, self.hi)
 
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         (a, b), (c, d) = self.lo[list(dims)], self.hi[list(dims)]
         return np.array([(a, b), (c, b), (c, d), (a, d)])

@@ -82,7 +82,7 @@ class Ellipsoid(Set):
     def _draw(self, n: int, rng: np.random.Generator) -> Floats:
         return self.c + points_in_unit_ball(n, self.dim, rng) @ _root(self.shape).T
 
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         k = list(dims)
         return self.c[k] + unit_circle() @ _root(self.shape[np.ix_(k, k)]).T
 

@@ -147,6 +147,9 @@ class ParametrisedSet:
         return [as_vector(row, None, role="Zonotope: generators", owner=owner, graph=graph) for row in table]
 
 
+Set._parametrised = ParametrisedSet
+
+
 def _diagonal(entries: list[Expr]) -> list[list[Expr]]:
     zero = entries[0].graph.constant(0)
     return [[e if i == j else zero for j in range(len(entries))] for i, e in enumerate(entries)]

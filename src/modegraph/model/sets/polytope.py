@@ -165,7 +165,7 @@ class Polytope(Set):
             return here
         return np.asarray(here + rng.uniform(backward, forward) * direction)
 
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         self.bounding_box()
         corners: list[tuple[float, float]] = []
         for along in unit_circle(64):

@@ -19,8 +19,6 @@ from modegraph.model.sets.quadric import ellipsoids
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from matplotlib.axes import Axes
-
     from modegraph.model.sets.ellipsoid import Ellipsoid
 
 LARGEST_GUESS = 12
@@ -246,35 +244,7 @@ class Sublevel(Set):
         missing = np.tile(self.center, (n - len(points), 1))
         return np.vstack([points, missing])
 
-    def plot(self, ax: Axes | None = None, dims: tuple[int, int] = (0, 1), **style: Any) -> Axes:
-        """Draw the slice through the point of least fn along two coordinates, and return the axes.
-
-        An interval around the set when it has one coordinate; an unbounded set is drawn near that point.
-        """
-        import matplotlib.pyplot as plt
-
-        if self.dim == 1 and self._box is not None:
-            return super().plot(ax, dims, **style)
-        if len(dims) != 2 or any(not 0 <= k < self.dim for k in dims):
-            raise ModegraphError(f"plot: dims={dims!r} must be two coordinates out of 0..{self.dim - 1}")
-        if ax is None:
-            ax = plt.subplots()[1]
-        lo, hi = self._box or (self.center - 1.0 - np.abs(self.center), self.center + 1.0 + np.abs(self.center))
-        pad = 0.05 * (hi - lo) + 1e-12
-        across, up = (np.linspace(lo[k] - pad[k], hi[k] + pad[k], 121) for k in dims)
-        grid = np.tile(self.center, (len(across) * len(up), 1))
-        grid[:, dims[0]] = np.tile(across, len(up))
-        grid[:, dims[1]] = np.repeat(up, len(across))
-        values = np.minimum(self.function.values(grid), 1e300).reshape(len(up), len(across))
-        colour = style.pop("edgecolor", style.pop("color", style.pop("colors", None)))
-        label = style.pop("label", None)
-        drawing = {key: style[key] for key in ("alpha", "linewidths", "linestyles", "zorder") if key in style}
-        ax.contour(across, up, values, levels=[self.level], colors="C0" if colour is None else [colour], **drawing)
-        if label is not None:
-            ax.plot([], [], color="C0" if colour is None else colour, label=label)
-        return ax
-
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         (a, b), (c, d) = (side[list(dims)] for side in self.bounding_box())
         return np.array([(a, b), (c, b), (c, d), (a, d)])
 

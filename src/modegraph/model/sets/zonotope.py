@@ -149,7 +149,7 @@ class Zonotope(Set):
         weights = rng.uniform(-1.0, 1.0, (n, self.generators.shape[1]))
         return self.c + weights @ self.generators.T
 
-    def _outline(self, dims: tuple[int, int]) -> Floats:
+    def outline(self, dims: tuple[int, int]) -> Floats:
         flat = self.generators[list(dims)].T
         flat = flat[np.any(flat != 0.0, axis=1)]
         flat = np.where((flat[:, 1] < 0) | ((flat[:, 1] == 0) & (flat[:, 0] < 0)), -1.0, 1.0)[:, None] * flat

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from modegraph.enclosure.monomials import Monomials, monomials
 from modegraph.enclosure.observe import observe_step, observed_bounds
 from modegraph.enclosure.rounding import UNIT
-from modegraph.enclosure.step import (
-    DONE,
-    NO_CONTRACTION,
-    flow_step,
-)
+from modegraph.enclosure.step import DONE, NO_CONTRACTION, flow_step
 from modegraph.expression.tape import Tape
 from modegraph.guarded import note, stopped
 from modegraph.reach.bounds import PolynomialBounds

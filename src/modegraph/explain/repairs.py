@@ -10,7 +10,7 @@ from typing import Literal
 
 from modegraph.certify.verdict import Approach, Status, Verdict
 from modegraph.errors import ModegraphError
-from modegraph.graph.pair import Pair
+from modegraph.explain.pair import Pair
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.graph.explain import Explanation
-from modegraph.graph.repairs import RepairSearch
+from modegraph.explain.explain import Explanation
+from modegraph.explain.repairs import RepairSearch
 from modegraph.report.tables import explanation_data
 from tests.certify.class_graphs import double_integrators
 from tests.graph.fakes import graph as fake
@@ -329,7 +329,7 @@ def test_an_interrupt_keeps_what_was_found(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_what_build_does_not_confirm_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    from modegraph.graph.pair import Pair
+    from modegraph.explain.pair import Pair
 
     undecided = mg.Verdict(mg.Status.UNDECIDED, "lost")
     monkeypatch.setattr(Pair, "built", lambda self, deadline: undecided)

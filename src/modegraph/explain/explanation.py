@@ -10,7 +10,7 @@ import numpy as np
 
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Widths
-from modegraph.graph.repairs import Repair
+from modegraph.explain.repairs import Repair
 
 Origin = Literal["counterexample", "sampled", "middle", ""]
 

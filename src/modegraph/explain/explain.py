@@ -12,9 +12,9 @@ from modegraph.certify.counterexamples.witnessed import witnessed
 from modegraph.certify.verdict import Approach, Status, Unproved, Verdict
 from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
-from modegraph.graph.explanation import Blocking, Explanation, explanation_text
-from modegraph.graph.pair import Pair
-from modegraph.graph.repairs import LATE, RepairSearch, attempt
+from modegraph.explain.explanation import Blocking, Explanation, explanation_text
+from modegraph.explain.pair import Pair
+from modegraph.explain.repairs import LATE, RepairSearch, attempt
 from modegraph.model.mode import Mode
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from modegraph.certify.unit import TargetSpec, certify_unit
 from modegraph.certify.verdict import Verdict
 from modegraph.cores import one_core
 from modegraph.deadline import Deadline
+from modegraph.graph.build import node_verdict
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Set, Sublevel, is_subset
 from modegraph.model.sets.scaled import scaled
@@ -117,8 +118,6 @@ class Pair:
 
     def built(self, deadline: float) -> Verdict:
         """The verdict on this pair from the unit of work that ``build(self.modes)`` does for it."""
-        from modegraph.graph.build import node_verdict
-
         source = self.source.name, self.source.match(self.r_i)
         target = self.target.name, 0 if isinstance(self.target, Target) else self.target.match(self.r_j)
         return node_verdict(self.modes, source, target, horizon=self.source.horizon, deadline=_until(deadline))
