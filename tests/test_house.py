@@ -21,7 +21,8 @@ IMPORTS = imports(FILES)
 
 LAYERS = (
     "errors", "attach", "deadline", "guarded", "cores", "workers", "expression", "enclosure", "model", "reach",
-    "certify", "graph", "plan", "explain", "store", "run", "report", "importers", "api", "", "model_file", "cli", "__main__",
+    "certify", "graph", "plan", "explain", "store", "run", "report", "importers",
+    "api", "", "model_file", "cli", "__main__",
 )  # fmt: skip
 """Folders and files of the package, each above those that may import it; "" is ``modegraph/__init__.py``."""
 UPWARD: dict[tuple[str, str], str] = {}
