@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from modegraph.certify.findings import Findings, merge
-from modegraph.certify.proof import SafetyProof, SwitchProof
 from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.verdict import Unproved
+from tests.certify.given import safety, switch
 
 MISSED = Missed(2.0, 1.0, True, np.zeros(1))
 EMPTY = Findings(missed={0: MISSED}, failure="at t = 0 s", unproved=Unproved("c", 0.0, 1.0), empty=True)
@@ -19,8 +19,9 @@ def undecided() -> Findings:
 
 
 def proved(latest: float) -> Findings:
-    switch = SwitchProof(0.5, latest, 0.1, 0.0, 1.0, {"c": latest}, 1)
-    return Findings(proofs={0: switch}, safety=SafetyProof({"c": latest}, latest, np.zeros(0)))
+    return Findings(
+        proofs={0: switch(latest=latest, slack={"c": latest})}, safety=safety({"c": latest}, latest, np.zeros(0))
+    )
 
 
 def test_parts_without_starts_are_not_needed() -> None:

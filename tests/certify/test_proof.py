@@ -10,31 +10,20 @@ import numpy as np
 import pytest
 
 import modegraph
+from modegraph.certify.lasting import LastingEvidence
 from modegraph.certify.proof import (
     SafetyProof,
     SwitchProof,
     certified_check,
     certified_switch,
-    least_slack,
     safe_together,
     together,
 )
+from modegraph.certify.switching.base import Evidence, least_slack
 from modegraph.certify.verdict import Status
+from tests.certify.given import safety, switch
 
 SOURCE = Path(modegraph.__file__).parent
-
-
-def switch(**changes: Any) -> SwitchProof:
-    given = {
-        "earliest": 0.5,
-        "latest": 1.0,
-        "margin": 0.1,
-        "window": 0.2,
-        "energy": 3.0,
-        "slack": {"a": 0.0},
-        "parts": 1,
-    }
-    return SwitchProof(**(given | changes))
 
 
 @pytest.mark.parametrize(
@@ -60,11 +49,11 @@ def test_an_incomplete_switch_raises(changes: dict[str, Any]) -> None:
 @pytest.mark.parametrize("slack, start", [({"a": -1.0}, 0.0), ({"a": np.nan}, 0.0), ({}, np.inf), ({}, np.nan)])
 def test_an_incomplete_check_raises(slack: dict[str, float], start: float) -> None:
     with pytest.raises(ValueError):
-        SafetyProof(slack, start, np.zeros(1))
+        safety(slack, start, np.zeros(1))
 
 
 def test_a_part_without_proof_leaves_the_whole_without() -> None:
-    safe = SafetyProof({"a": 1.0}, 2.0, np.array([1.0, 5.0]))
+    safe = safety({"a": 1.0}, 2.0, np.array([1.0, 5.0]))
     assert together([]) is None
     assert safe_together([]) is None
     assert together([switch(), None]) is None
@@ -90,8 +79,8 @@ def test_the_whole_is_as_good_as_its_worst_part() -> None:
     assert whole.parts == 2
     safe = safe_together(
         [
-            SafetyProof({"a": 1.0}, 2.0, np.array([1.0, 5.0])),
-            SafetyProof({"a": 0.5}, 3.0, np.array([2.0, 4.0])),
+            safety({"a": 1.0}, 2.0, np.array([1.0, 5.0])),
+            safety({"a": 0.5}, 3.0, np.array([2.0, 4.0])),
         ]
     )
     assert safe is not None
@@ -107,7 +96,31 @@ def test_verdicts_of_proofs() -> None:
     assert verdict.time == (0.5, 1.0)
     assert verdict.horizon == 4.0
     assert "zero time" in certified_switch(switch(earliest=0.0, latest=0.0), None).reason
-    assert certified_check(SafetyProof({}, 0.0, np.array([np.inf]))).tracking is None
+    assert certified_check(safety({}, 0.0, np.array([np.inf]))).tracking is None
+
+
+@pytest.mark.parametrize("evidence", [(), (0.5, 1.0), ({"earliest": 0.0, "latest": 1.0},)])
+def test_a_proof_is_made_of_evidence_and_nothing_else(evidence: Any) -> None:
+    with pytest.raises(ValueError, match="without evidence"):
+        SwitchProof(evidence)
+    with pytest.raises(ValueError, match="without evidence"):
+        SafetyProof(evidence)
+
+
+def test_evidence_cannot_be_made_without_all_that_is_claimed() -> None:
+    with pytest.raises(TypeError, match="abstract"):
+        Evidence()  # type: ignore[abstract]
+    with pytest.raises(TypeError, match="abstract"):
+        LastingEvidence()  # type: ignore[abstract]
+
+
+@pytest.mark.parametrize("folder", ["graph", "plan", "explain", "report", "run"])
+def test_only_the_prover_makes_proofs(folder: str) -> None:
+    """Nothing above certify/ makes evidence or a proof: it asks for verdicts."""
+    made = {"SwitchProof", "SafetyProof", "certified_switch", "certified_check", "OfPair", "OfEveryPair"}
+    for path in (SOURCE / folder).rglob("*.py"):
+        names = {n.id for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Name)}
+        assert not names & made, path
 
 
 def test_certified_is_constructed_in_one_place() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modegraph.certify.switching.common_time import Nearest
+from modegraph.certify.switching.base import Nearest
 from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Approach, Floats
 from modegraph.model.sets import Ball, Ellipsoid, Sublevel

@@ -9,12 +9,14 @@ from functools import partial
 import numpy as np
 
 from modegraph.certify.course import Course
-from modegraph.certify.evidence import lasting, sampled_violation, slack_until, unproved
 from modegraph.certify.findings import Findings, Waiting
-from modegraph.certify.proof import SafetyProof, SwitchProof, least_slack
+from modegraph.certify.lasting import BehindFlows, NothingToKeep
+from modegraph.certify.legal import proved_instants, sampled_violation, unproved
+from modegraph.certify.proof import SafetyProof, SwitchProof
 from modegraph.certify.question import Goal, Question
-from modegraph.certify.switching.common_time import Crossing, Missed, Reach, find_crossings, proved_instants
-from modegraph.certify.switching.funnel import Arrival, Sinking
+from modegraph.certify.switching.base import Way
+from modegraph.certify.switching.common_time import CommonTimes, Missed, Reach, find_crossings
+from modegraph.certify.switching.funnel import Arrival, Sinking, Sunk
 from modegraph.guarded import guarded
 from modegraph.reach.flow.flow import Flow
 from modegraph.reach.tail.box import Tail
@@ -91,10 +93,9 @@ def _proved(course: Course, j: int, past: Past) -> SwitchProof | Missed:
 def _safety(question: Question, flows: Sequence[Flow], tail: Tail | None) -> SafetyProof | None:
     last = flows[-1].fields[-1]
     if tail is not None:
-        return lasting(flows, tail)
+        return SafetyProof((BehindFlows(flows, tail),))
     if question.linear and not last.faces and flows[-1].time >= last.start:
-        # A linear loop has a solution for all time, and there is nothing else to prove.
-        return SafetyProof({}, flows[-1].time, np.full(last.outputs, np.inf))
+        return SafetyProof((NothingToKeep(flows[-1]),))
     return None
 
 
@@ -106,72 +107,45 @@ class _Switch:
         self.goal: Goal = self.question.goals[j]
         self.flows, self.past = course.flows, past
         self.sinking = course.tail if isinstance(course.tail, Sinking) else None
-        self.ahead = past.ahead(float(self.flows[0].times[0]))
-        self.slack = [slack_until(f, len(f.steps)) for f in past.flows]
-        seen = [self._reach(f).earliest(self.goal.region, self.question.compiled.plant) for f in past.flows]
-        self.earliest = min((t for t in seen if t is not None), default=None)
-        """Seconds after entry before which no trajectory is in the target; None: none may have been there yet."""
+        seen = (self._reach(f).earliest(self.goal.region, self.question.compiled.plant) for f in past.flows)
+        touched = tuple(t for t in seen if t is not None)
+        self.way = Way(past.flows, touched, past.ahead(float(self.flows[0].times[0])))
 
     def _reach(self, flow: Flow) -> Reach:
         return Reach(flow, self.question.horizon, self.goal.reset)
-
-    def _sooner(self, seconds: float) -> float:
-        """An instant on the clock of the flows, on that of the trajectory that is furthest ahead."""
-        return seconds if self.ahead == 0.0 else max(0.0, float(np.nextafter(seconds - self.ahead, -np.inf)))
 
     def outcome(self) -> SwitchProof | Missed:
         best: Missed | None = None
         for flow in self.flows:
             reach = self._reach(flow)
             touched = reach.earliest(self.goal.region, self.question.compiled.plant)
-            if touched is not None:
-                own = self._sooner(touched)
-                self.earliest = own if self.earliest is None else min(self.earliest, own)
             found = find_crossings(reach, self.goal.region)
             if not isinstance(found, Missed):
-                return self._crossed(flow, found)
+                return SwitchProof((CommonTimes(flow, found, touched, way=self.way),))
             if best is None or found.gauge < best.gauge:
                 whole = flow is self.flows[0] and not self.past.chains
                 start = (*self.past.flows, *self.flows)[0].piece.middle
                 best = found if whole else replace(found, start=start, sampled=False)
             if proved_instants(flow) < len(flow.steps):
                 break
-            self.slack.append(slack_until(flow, len(flow.steps)))
+            if flow is not self.flows[-1]:
+                self._passed(flow, touched)
         assert best is not None
         # The search goes on by the bounds of whole steps: starts and breakpoints may lack a proof in any flow.
         legal = all(proved_instants(f) == len(f.steps) for f in self.flows)
         if self.sinking is None or self.goal.reset is not None or not legal:
             return best
-        return self._sunk(self.sinking, best)
+        return self._sunk(self.sinking, touched, best)
 
-    def _crossed(self, flow: Flow, crossings: Sequence[Crossing]) -> SwitchProof:
-        first = self._sooner(min(c.time for c in crossings))
-        latest = max(c.instant for c in crossings)
-        return SwitchProof(
-            earliest=float(first if self.earliest is None else min(self.earliest, first)),
-            latest=max(c.time for c in crossings),
-            margin=min(1.0 - c.best for c in crossings),
-            window=min(c.window for c in crossings),
-            energy=max(c.energy for c in crossings),
-            slack=least_slack([*self.slack, slack_until(flow, latest)]),
-            parts=len(crossings),
-            nearest=max(crossings, key=lambda c: c.best).nearest,
-        )
+    def _passed(self, flow: Flow, touched: float | None) -> None:
+        """All starts have gone on to the next flow."""
+        when = () if touched is None else (self.way.sooner(touched),)
+        self.way = Way([*self.way.flows, flow], (*self.way.touched, *when), self.way.ahead)
 
-    def _sunk(self, sinking: Sinking, best: Missed) -> SwitchProof | Missed:
+    def _sunk(self, sinking: Sinking, touched: float | None, best: Missed) -> SwitchProof | Missed:
         last = self.flows[-1]
         arrival = sinking.arrival(self.goal.region, self.question.end)
         if not isinstance(arrival, Arrival):
             closer = replace(arrival, start=best.start, hopeful=best.hopeful, sampled=best.sampled)
             return closer if arrival.gauge < best.gauge else best
-        spent = float(last.seen_bounds.upper(last.steps[-1].energy) + last.steps[-1].energy_radius)
-        return SwitchProof(
-            earliest=self._sooner(sinking.start) if self.earliest is None else self.earliest,
-            latest=float(np.nextafter(sinking.start + arrival.seconds, np.inf)),
-            margin=1.0 - arrival.best,
-            window=np.inf,
-            energy=float(np.nextafter(spent + arrival.energy, np.inf)),
-            slack=least_slack([*self.slack, sinking.slack()]),
-            parts=1,
-            nearest=arrival.nearest,
-        )
+        return SwitchProof((Sunk(last, sinking, arrival, touched, way=self.way),))

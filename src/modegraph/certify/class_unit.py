@@ -5,14 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from modegraph.certify.evidence import lasting, proved, proved_until, sampled_violation, slack_until, width_over_time
-from modegraph.certify.proof import SafetyProof, certified_check, least_slack
+from modegraph.certify.lasting import BehindFlows, NothingToKeep
+from modegraph.certify.legal import (
+    proved,
+    proved_instants,
+    proved_until,
+    sampled_violation,
+    slack_until,
+    width_over_time,
+)
+from modegraph.certify.proof import SafetyProof, certified_check
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
-from modegraph.certify.switching.common_time import proved_instants
+from modegraph.certify.switching.base import least_slack
 from modegraph.certify.targets.family import TargetClass, target_class
 from modegraph.certify.unit import TargetSpec
 from modegraph.certify.verdict import Floats, Status, Verdict
@@ -20,6 +29,7 @@ from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
 from modegraph.expression.scalar import Expr
 from modegraph.expression.simplify import simplify
+from modegraph.guarded import guarded, stopped
 from modegraph.model.class_start import StartClass, returned_start
 from modegraph.model.mode import Mode
 from modegraph.model.sets.parametrised import ParametrisedSet
@@ -42,15 +52,10 @@ PROGRESS = 1.05
 
 @dataclass(frozen=True)
 class ClassResult:
-    """Relations parallel to the targets (a text where there can be none), and the check of the whole class.
-
-    ``slack``: of the constraints, until the last instant any of the relations uses.
-    """
+    """Relations parallel to the targets (a text where there can be none), and the check of the whole class."""
 
     relations: list[Relation | str]
     check: Verdict
-    slack: dict[str, float]
-    horizon: float
 
 
 def relate(
@@ -80,9 +85,10 @@ def relate(
     links.appear(deadline, progress)
     links.refine(cuts, deadline, progress)
     known = iter(links.relations)
-    relations = [goal if isinstance(goal, str) else next(known) for goal in goals]
+    # Of the constraints until the last instant that any of the relations uses.
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
-    return ClassResult(relations, _check(compiled, links.chains), slack, end)
+    relations = [goal if isinstance(goal, str) else replace(next(known), slack=slack) for goal in goals]
+    return ClassResult(relations, _check(compiled, links.chains))
 
 
 def _goal(spec: TargetSpec, plant: int) -> TargetClass | str:
@@ -166,20 +172,22 @@ def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
     widths = width_over_time(chains[0].flows[:1])
     if compiled.linear and not any(f.faces for f in compiled.fields) and until >= last.start:
         # A linear loop has a solution for all time, and there is nothing else to prove.
-        return replace(certified_check(SafetyProof({}, until, np.full(last.outputs, np.inf))), widths=widths)
+        ends = [chain.flows[-1] for chain in chains]
+        return replace(certified_check(SafetyProof(tuple(NothingToKeep(flow) for flow in ends))), widths=widths)
     if until < 0.0:
         reason = "the constraints are not proved at the start for all references of the class"
         return Verdict(Status.UNDECIDED, reason, until=0.0, widths=widths)
-    tail = _tail(compiled, chains)
-    if isinstance(tail, Tail):
-        return replace(
-            certified_check(lasting([flow for chain in chains for flow in chain.flows], tail)), widths=widths
+    tails = _tails(compiled, chains)
+    if isinstance(tails, TailFailure):
+        reason = (
+            f"constraints proved until t = {until:.4g} s for all references of the class, not for ever: {tails.reason}"
         )
-    reason = f"constraints proved until t = {until:.4g} s for all references of the class, not for ever: {tail.reason}"
-    return Verdict(Status.UNDECIDED, reason, until=until, widths=widths)
+        return Verdict(Status.UNDECIDED, reason, until=until, widths=widths)
+    evidence = tuple(BehindFlows(chain.flows, tail) for chain, tail in zip(chains, tails, strict=True))
+    return replace(certified_check(SafetyProof(evidence)), widths=widths)
 
 
-def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure:
+def _tails(compiled: CompiledMode, chains: Sequence[Chain]) -> list[Tail] | TailFailure:
     """Invariant sets from the ends of the flows on, their centres moving with the reference: one for each part."""
     found: list[Tail] = []
     for chain in chains:
@@ -190,20 +198,17 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         search = TailSearch(
             flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
         )
-        tail = search.attempt([flow])
+        tail = guarded("the search for an invariant set", partial(search.attempt, [flow]), _no_tail)
         if isinstance(tail, TailFailure):
             return tail
         if not (tail.face_upper <= 0.0).all():
             return TailFailure("a constraint cannot be proved on the invariant set")
         found.append(tail)
-    return Tail(
-        max(tail.start for tail in found),
-        np.max([tail.face_upper for tail in found], axis=0),
-        np.max([tail.tracking for tail in found], axis=0),
-        np.min([tail.lo for tail in found], axis=0),
-        np.max([tail.hi for tail in found], axis=0),
-        min(tail.decay for tail in found),
-    )
+    return found
+
+
+def _no_tail(error: Exception) -> Tail | TailFailure:
+    return TailFailure(stopped(error))
 
 
 def _tail_order(chain: Chain) -> Order:

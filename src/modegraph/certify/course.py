@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modegraph.certify.evidence import set_size
+from modegraph.certify.legal import proved_instants, set_size
 from modegraph.certify.question import Question
-from modegraph.certify.switching.common_time import proved_instants
 from modegraph.certify.switching.funnel import Arrival, Funnels, Sinking
 from modegraph.guarded import guarded, stopped
 from modegraph.reach.cover.restart import WIDE_GAP, filled_share, restarted

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.switching.common_time import proved_instants
+from modegraph.certify.legal import proved_instants
 from modegraph.certify.targets.family import TargetClass
 from modegraph.enclosure.rounding import UNIT
 from modegraph.reach.flow.flow import Flow

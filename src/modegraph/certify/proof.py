@@ -1,94 +1,120 @@
-"""Proof objects of condition (C), and the only place where CERTIFIED is constructed."""
+"""Proof objects of condition (C) and of Assumption 1, and the only place where CERTIFIED is constructed.
+
+A proof is made of evidence objects, which are made of what shows it (flows, funnels, relations): no number of a
+certified verdict is ever handed in.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from modegraph.certify.switching.common_time import Nearest
-from modegraph.certify.verdict import Floats, Status, Verdict
+from modegraph.certify.lasting import LastingEvidence
+from modegraph.certify.relation import Relation
+from modegraph.certify.switching.base import Evidence, Nearest, least_slack
+from modegraph.certify.switching.families import OfEveryPair, OfPair
+from modegraph.certify.verdict import Approach, Floats, Status, Verdict
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SwitchProof:
     """Every start of one part of S_i (and of the unknowns) is in S_j by ``latest``, legally.
 
-    Built only by `zero_time`, from crossings of one flowpipe, or by `together` from proofs of parts
-    that cover the whole.
+    The union of the parts of its evidence: together they hold all starts of it.
     """
 
-    earliest: float
-    latest: float
-    margin: float
-    window: float
-    energy: float
-    slack: Mapping[str, float]
-    parts: int
-    nearest: Nearest | None = field(default=None, compare=False)
-    """The part with the least margin, at its best instant."""
+    evidence: tuple[Evidence, ...]
 
     def __post_init__(self) -> None:
+        if not self.evidence or not all(isinstance(e, Evidence) for e in self.evidence):
+            raise ValueError("a proof of a switch without evidence")
         numbers = (self.earliest, self.latest, self.margin, self.window, self.energy)
         if any(np.isnan(v) for v in numbers) or not 0.0 <= self.earliest <= self.latest < np.inf:
             raise ValueError("an incomplete proof of a switch")
         if any(not v >= 0.0 for v in self.slack.values()):
             raise ValueError("a proof of a switch with a constraint that is not proved")
 
+    @cached_property
+    def earliest(self) -> float:
+        return min(e.earliest for e in self.evidence)
 
-@dataclass(frozen=True)
+    @cached_property
+    def latest(self) -> float:
+        return max(e.latest for e in self.evidence)
+
+    @cached_property
+    def margin(self) -> float:
+        return min(e.margin for e in self.evidence)
+
+    @cached_property
+    def window(self) -> float:
+        return min(e.window for e in self.evidence)
+
+    @cached_property
+    def energy(self) -> float:
+        return max(e.energy for e in self.evidence)
+
+    @cached_property
+    def slack(self) -> dict[str, float]:
+        return least_slack(e.slack for e in self.evidence)
+
+    @property
+    def parts(self) -> int:
+        return sum(e.parts for e in self.evidence)
+
+    @property
+    def nearest(self) -> Nearest | None:
+        """The part with the least margin, at its best instant."""
+        return min(self.evidence, key=lambda e: e.margin).nearest
+
+
+@dataclass(frozen=True, eq=False)
 class SafetyProof:
-    """The constraints hold for all t >= 0 from every start of one part of S_i (Assumption 1)."""
+    """The constraints hold for all t >= 0 from every start of some parts of S_i (Assumption 1)."""
 
-    slack: Mapping[str, float]
-    tail_start: float
-    tracking: Floats
+    evidence: tuple[LastingEvidence, ...]
 
     def __post_init__(self) -> None:
+        if not self.evidence or not all(isinstance(e, LastingEvidence) for e in self.evidence):
+            raise ValueError("a proof of Assumption 1 without evidence")
         if any(not v >= 0.0 for v in self.slack.values()) or not np.isfinite(self.tail_start):
             raise ValueError("an incomplete proof of Assumption 1")
 
+    @cached_property
+    def slack(self) -> dict[str, float]:
+        return least_slack(e.slack for e in self.evidence)
 
-def least_slack(many: Iterable[Mapping[str, float]]) -> dict[str, float]:
-    """Smallest slack of each constraint."""
-    least: dict[str, float] = {}
-    for slack in many:
-        for name, value in slack.items():
-            least[name] = min(value, least.get(name, np.inf))
-    return least
+    @cached_property
+    def tail_start(self) -> float:
+        """Seconds from which on all trajectories are in invariant sets."""
+        return max(e.start for e in self.evidence)
+
+    @cached_property
+    def tracking(self) -> Floats:
+        """Bounds (m,) of |h(x) - r| for all time."""
+        return np.asarray(np.max([e.tracking for e in self.evidence], axis=0))
 
 
 def together(proofs: Sequence[SwitchProof | None]) -> SwitchProof | None:
     """A proof for the union of the parts: only if every part has one."""
-    if not proofs or any(proof is None for proof in proofs):
-        return None
     parts = [proof for proof in proofs if proof is not None]
-    return SwitchProof(
-        earliest=min(p.earliest for p in parts),
-        latest=max(p.latest for p in parts),
-        margin=min(p.margin for p in parts),
-        window=min(p.window for p in parts),
-        energy=max(p.energy for p in parts),
-        slack=least_slack(p.slack for p in parts),
-        parts=sum(p.parts for p in parts),
-        nearest=min(parts, key=lambda p: p.margin).nearest,
-    )
+    if not parts or len(parts) < len(proofs):
+        return None
+    return SwitchProof(tuple(e for proof in parts for e in proof.evidence))
 
 
 def safe_together(proofs: Sequence[SafetyProof | None]) -> SafetyProof | None:
     """Assumption 1 for the union of the parts: only if every part has a proof."""
-    if not proofs or any(proof is None for proof in proofs):
-        return None
     parts = [proof for proof in proofs if proof is not None]
-    return SafetyProof(
-        slack=least_slack(p.slack for p in parts),
-        tail_start=max(p.tail_start for p in parts),
-        tracking=np.max([p.tracking for p in parts], axis=0),
-    )
+    if not parts or len(parts) < len(proofs):
+        return None
+    return SafetyProof(tuple(e for proof in parts for e in proof.evidence))
 
 
-def certified_switch(proof: SwitchProof, horizon: float | None) -> Verdict:
+def certified_switch(proof: SwitchProof, horizon: float | None, closest: Approach | None = None) -> Verdict:
     """The verdict of a complete proof of condition (C)."""
     if proof.latest == 0.0:
         reason = "every start is already in the target: a switch in zero time"
@@ -104,7 +130,20 @@ def certified_switch(proof: SwitchProof, horizon: float | None) -> Verdict:
         horizon=horizon,
         energy=proof.energy,
         window=proof.window,
+        closest=closest,
     )
+
+
+def certified_pair(relation: Relation, source: Floats, target: Floats, horizon: float | None) -> Verdict:
+    """The verdict on a pair (1, ki), (1, kj) of references that a relation certifies."""
+    return certified_switch(SwitchProof((OfPair(relation, source, target),)), horizon)
+
+
+def certified_for_some(relation: Relation, source: Floats, target: Floats, told: str, horizon: float | None) -> Verdict:
+    """The existential verdict on two classes; its numbers hold for every certified pair, its margin is of this one."""
+    verdict = certified_switch(SwitchProof((OfEveryPair(relation, source, target),)), horizon)
+    reason = f"certified for a continuous set of references, among them {told}"
+    return replace(verdict, reason=reason, margin=OfPair(relation, source, target).margin)
 
 
 def certified_check(proof: SafetyProof) -> Verdict:

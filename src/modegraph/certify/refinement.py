@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.continuous import ContinuousReferences
-from modegraph.certify.evidence import proved
+from modegraph.certify.legal import proved
 from modegraph.certify.moments import moments_of
 from modegraph.certify.relation import Part, Relation, whole_relation
 from modegraph.certify.targets.family import TargetClass

@@ -7,8 +7,8 @@ pairs for which that part is inside S_j. A union over parts would be unsound.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -65,12 +65,15 @@ class Relation:
     rest : TargetClass or None
         The centres of the start sets of the source, where each is an equilibrium of its own: a start
         that stays there for ever.
+    slack : mapping
+        Proved distance from each constraint, up to any instant of the parts.
     """
 
     region: Box | None
     goal: TargetClass
     parts: tuple[Part, ...]
     rest: TargetClass | None
+    slack: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def source(self) -> int:

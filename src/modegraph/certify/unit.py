@@ -22,11 +22,11 @@ from modegraph.certify.counterexamples.trajectory import (
     trapped_in,
 )
 from modegraph.certify.decision import decide
-from modegraph.certify.evidence import slack_until, width_over_time
 from modegraph.certify.findings import Findings
+from modegraph.certify.legal import width_over_time
 from modegraph.certify.proof import SwitchProof, certified_check, certified_switch
 from modegraph.certify.question import Goal, Question
-from modegraph.certify.switching.common_time import Nearest
+from modegraph.certify.switching.zero_time import InZeroTime
 from modegraph.certify.targets.region import Region
 from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Witness
@@ -185,18 +185,13 @@ class _Unit:
         flow = compiled.flow(compiled.whole(), Order(1, 0) if compiled.linear else Order(4, 2))
         if flow.failure is not None or not (flow.faces_at(0.0, flow.p0, flow.G0, 0) <= 0.0).all():
             return
-        slack = slack_until(flow, 0)
         for k in candidates:
-            n, region = compiled.plant, self.goals[k].region
-            gauge = float(region.gauges(flow.bounds, flow.p0[None, :n], [flow.G0])[0])
-            nearest = Nearest(0.0, gauge, flow.bounds, flow.p0, flow.G0, np.zeros(n))
-            self.verdicts[k] = self._switch(
-                k, SwitchProof(0.0, 0.0, max(0.0, 1.0 - gauge), 0.0, 0.0, slack, 1, nearest)
-            )
+            evidence = InZeroTime(compiled.one_start, flow, self.goals[k].region)
+            self.verdicts[k] = self._switch(k, SwitchProof((evidence,)))
 
     def _switch(self, k: int, proof: SwitchProof) -> Verdict:
         closest = approach_of(proof.nearest, self.goals[k].region, self._names(k))
-        return replace(certified_switch(proof, self.horizon), closest=closest)
+        return certified_switch(proof, self.horizon, closest)
 
     def _names(self, k: int) -> Sequence[str]:
         """States over which target k is a set."""

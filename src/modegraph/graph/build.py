@@ -121,11 +121,11 @@ class _Unit:
         nothing = Verdict(Status.UNDECIDED, reason, horizon=self.horizon)
         return _Result(UnitResult([nothing] * len(self.targets), nothing), self.links(reason))
 
-    def links(self, relations: Sequence[Relation | str] | str, slack: Any = None) -> dict[tuple[Node, Node], Link]:
+    def links(self, relations: Sequence[Relation | str] | str) -> dict[tuple[Node, Node], Link]:
         """Links to ``linked_nodes``; one text for all where nothing is known."""
         many = [relations] * len(self.linked_nodes) if isinstance(relations, str) else relations
         return {
-            (self.node, node): Link(relation, slack or {}, self.horizon)
+            (self.node, node): Link(relation, self.horizon)
             for node, relation in zip(self.linked_nodes, many, strict=True)
         }
 
@@ -235,7 +235,7 @@ def _examined(unit: _Unit, deadline: Deadline, progress: Callable[[str], None], 
         progress=progress,
         cuts=cuts,
     )
-    return _Result(finite or UnitResult([], found.check), unit.links(found.relations, found.slack))
+    return _Result(finite or UnitResult([], found.check), unit.links(found.relations))
 
 
 @dataclass(eq=False)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.moments import at_state
-from modegraph.certify.proof import SwitchProof, certified_switch
+from modegraph.certify.proof import certified_for_some, certified_pair
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.relation import Part, Relation
 from modegraph.certify.targets.family import target_class
@@ -28,12 +28,11 @@ Key = tuple[str, int]
 class Link:
     """What is known of the switch between two nodes, one of them a whole continuous class.
 
-    ``relation`` is a text where there can be none. ``slack`` of the constraints and ``horizon`` in
-    seconds (None: as far as the flowpipe went) belong to the source.
+    ``relation`` is a text where there can be none. ``horizon`` in seconds (None: as far as the flowpipe went)
+    belongs to the source.
     """
 
     relation: Relation | str
-    slack: Mapping[str, float]
     horizon: float | None
 
 
@@ -72,10 +71,9 @@ class Classes:
         if isinstance(link.relation, str):
             return Verdict(Status.UNDECIDED, link.relation, horizon=link.horizon)
         left, right = self.row(source[0], p), self.row(target[0], q)
-        crossings = link.relation.crossings(left, right)
-        gauge = float(crossings.gauge[0])
+        gauge = float(link.relation.crossings(left, right).gauge[0])
         if gauge <= 1.0:
-            return _certified(link, gauge, float(crossings.latest[0]), float(crossings.energy[0]))
+            return certified_pair(link.relation, left, right, link.horizon)
         if link.relation.refuted(left, right)[0]:
             return _resting(link.relation, left, right)
         return _missed(link, gauge)
@@ -104,11 +102,7 @@ class Classes:
         assert isinstance(link.relation, Relation)
         where = f"r_i = {_text(left)}, r_j = {_text(right)}"
         if gauge <= 1.0:
-            times, energies = link.relation.extremes
-            proof = SwitchProof(0.0, times, 0.0, 0.0, energies, dict(link.slack), len(link.relation.parts))
-            verdict = certified_switch(proof, link.horizon)
-            reason = f"certified for a continuous set of references, among them {where}"
-            return replace(verdict, reason=reason, margin=1.0 - gauge)
+            return certified_for_some(link.relation, left[None], right[None], where, link.horizon)
         if not texts and refs.all_refuted(r_i, r_j):
             told = _resting(link.relation, left[None], right[None])
             reason = f"refuted for all references; closest {where}: {told.reason}"
@@ -127,12 +121,6 @@ class Classes:
 
 def _text(p: NDArray[np.float64]) -> str:
     return parameter_text(p) if len(p) else "the only one"
-
-
-def _certified(link: Link, gauge: float, latest: float, energy: float) -> Verdict:
-    parts = len(link.relation.parts) if isinstance(link.relation, Relation) else 1
-    proof = SwitchProof(0.0, latest, 1.0 - gauge, 0.0, energy, dict(link.slack), parts)
-    return certified_switch(proof, link.horizon)
 
 
 def _missed(link: Link, gauge: float) -> Verdict:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.switching.common_time import Missed, Reach, find_crossings, proved_instants
+from modegraph.certify.legal import proved_instants
+from modegraph.certify.switching.common_time import Missed, Reach, find_crossings
 from modegraph.certify.targets.region import Region
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.flow.flow import Flow, Order

@@ -8,7 +8,8 @@ import numpy as np
 
 from modegraph.certify.approach import approach_of
 from modegraph.certify.counterexamples.trajectory import PointRun, scene_of
-from modegraph.certify.switching.common_time import Nearest, Reach
+from modegraph.certify.switching.base import Nearest
+from modegraph.certify.switching.common_time import Reach
 from modegraph.certify.unit import POINT_STEPS, TargetSpec, goal_of
 from modegraph.certify.verdict import Approach, Floats, Unproved, Witness
 from modegraph.deadline import Deadline

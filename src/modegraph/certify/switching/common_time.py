@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.certify.legal import proved_instants, slack_until
 from modegraph.certify.samples import powers_at, sample_variables
+from modegraph.certify.switching.base import Evidence, Nearest, least_slack
 from modegraph.certify.targets.region import Region
 from modegraph.expression.tape import Tape
 from modegraph.reach.bounds import PolynomialBounds
@@ -20,25 +22,6 @@ Floats = NDArray[np.float64]
 
 DEEPEST_CELL = 7
 """A piece is cut into at most 2**DEEPEST_CELL cells, each with its own switching time."""
-
-
-@dataclass(frozen=True, eq=False)
-class Nearest:
-    """The set {p(xi) + sum_g G_g(xi) zeta_g + box(lost)} of one part of the starts, when it is nearest to a target.
-
-    Attributes
-    ----------
-    time : seconds
-    gauge : its bound in the target
-    bounds, p, G, lost : of p (n, N), G (g, n, Nq), lost (n,)
-    """
-
-    time: float
-    gauge: float
-    bounds: PolynomialBounds
-    p: Floats
-    G: Floats
-    lost: Floats
 
 
 @dataclass(frozen=True)
@@ -56,6 +39,56 @@ class Crossing:
     window: float
     energy: float
     nearest: Nearest | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CommonTimes(Evidence):
+    """The cells of a flow's piece, each inside the target as a whole at an instant of its own.
+
+    ``touched``: seconds on the clock of the flow at which a trajectory may first be in the target, if at any.
+    """
+
+    flow: Flow
+    crossings: Sequence[Crossing]
+    touched: float | None
+
+    def __post_init__(self) -> None:
+        if not self.crossings or any(not c.gauge <= 1.0 for c in self.crossings):
+            raise ValueError("a crossing that is not one")
+
+    @property
+    def earliest(self) -> float:
+        # Not later than the switch itself, however loose the bounds of whole steps are.
+        own = [c.time for c in self.crossings] + ([] if self.touched is None else [self.touched])
+        return float(min([*self.way.touched, *(self.way.sooner(t) for t in own)]))
+
+    @property
+    def latest(self) -> float:
+        return max(c.time for c in self.crossings)
+
+    @property
+    def margin(self) -> float:
+        return min(1.0 - c.best for c in self.crossings)
+
+    @property
+    def window(self) -> float:
+        return min(c.window for c in self.crossings)
+
+    @property
+    def energy(self) -> float:
+        return max(c.energy for c in self.crossings)
+
+    @property
+    def slack(self) -> dict[str, float]:
+        return least_slack([self.way.slack, slack_until(self.flow, max(c.instant for c in self.crossings))])
+
+    @property
+    def parts(self) -> int:
+        return len(self.crossings)
+
+    @property
+    def nearest(self) -> Nearest | None:
+        return max(self.crossings, key=lambda c: c.best).nearest
 
 
 @dataclass(frozen=True)
@@ -132,26 +165,6 @@ def region_separated(region: Region, lo: Floats, hi: Floats) -> NDArray[np.bool_
     if region.dim != lo.shape[1]:
         return np.zeros(len(lo), bool)
     return region.separated(lo, hi)
-
-
-def proved_instants(flow: Flow) -> int:
-    """Largest k such that the constraints are proved on the closed interval [0, times[k]]; -1: not at 0.
-
-    At a breakpoint of the reference both one-sided inputs count.
-    """
-    if flow.failure is not None and not flow.steps:
-        return -1
-    if not (flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment) <= 0.0).all():
-        return -1
-    for k, step in enumerate(flow.steps):
-        if not (step.face_upper <= 0.0).all():
-            return k
-        fld = flow.fields[step.segment]
-        if step.end >= fld.end and step.segment + 1 < len(flow.fields):
-            after = flow.faces_at(step.end, step.p, step.G, step.segment + 1)
-            if not (after <= 0.0).all():
-                return k
-    return len(flow.steps)
 
 
 def find_crossings(reach: Reach, region: Region) -> list[Crossing] | Missed:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modegraph.certify.proof import least_slack
+from modegraph.certify.legal import slack_until
 from modegraph.certify.samples import sample_powers
-from modegraph.certify.switching.common_time import Missed, Nearest
+from modegraph.certify.switching.base import Evidence, Nearest, least_slack
+from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Floats
 from modegraph.deadline import Deadline
@@ -123,6 +124,55 @@ class Sinking:
         rungs = self.funnel.rungs[self.rung :]
         names = self.funnel.loop.fld.faces
         return least_slack({name: -float(v)} for r in rungs for name, v in zip(names, r.face_upper, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Sunk(Evidence):
+    """A flow ends in a funnel that leads into the target, and stays there for ever.
+
+    ``touched``: seconds on the clock of the flow at which a trajectory may first be in the target, if at any.
+    """
+
+    flow: Flow
+    sinking: Sinking
+    arrival: Arrival
+    touched: float | None
+
+    def __post_init__(self) -> None:
+        if self.sinking.start != self.flow.time or not self.arrival.best <= 1.0:
+            raise ValueError("a funnel that the flow does not lead into, or that does not lead into the target")
+
+    @property
+    def earliest(self) -> float:
+        own = self.sinking.start if self.touched is None else self.touched
+        return float(min([*self.way.touched, self.way.sooner(own)]))
+
+    @property
+    def latest(self) -> float:
+        return float(np.nextafter(self.sinking.start + self.arrival.seconds, np.inf))
+
+    @property
+    def margin(self) -> float:
+        return 1.0 - self.arrival.best
+
+    @property
+    def window(self) -> float:
+        return math.inf
+
+    @property
+    def energy(self) -> float:
+        step = self.flow.steps[-1]
+        spent = float(self.flow.seen_bounds.upper(step.energy) + step.energy_radius)
+        return float(np.nextafter(spent + self.arrival.energy, np.inf))
+
+    @property
+    def slack(self) -> dict[str, float]:
+        own = slack_until(self.flow, len(self.flow.steps))
+        return least_slack([self.way.slack, own, self.sinking.slack()])
+
+    @property
+    def nearest(self) -> Nearest | None:
+        return self.arrival.nearest
 
 
 def gauge_of(ball: NormBall, region: Region) -> float:

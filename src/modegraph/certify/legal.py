@@ -1,4 +1,4 @@
-"""What a finished flow shows: slack of the constraints, where it is nonlinear, whether samples break a constraint."""
+"""The constraints along finished flows: until when they are proved, with what slack, and what breaks them."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.proof import SafetyProof, least_slack
 from modegraph.certify.samples import sample_powers
-from modegraph.certify.switching.common_time import proved_instants
 from modegraph.certify.verdict import Unproved, Widths
 from modegraph.expression.evaluate import Evaluator
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.flow.flow import Flow
 from modegraph.reach.flow.framing import generator_box
-from modegraph.reach.tail.box import Tail
 
 Floats = NDArray[np.float64]
 
@@ -23,17 +20,38 @@ INSTANTS = 8
 """Looks at the widths of a flow."""
 
 
+def proved_instants(flow: Flow) -> int:
+    """Largest k such that the constraints are proved on the closed interval [0, times[k]]; -1: not at 0.
+
+    At a breakpoint of the reference both one-sided inputs count.
+    """
+    if flow.failure is not None and not flow.steps:
+        return -1
+    if not (flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment) <= 0.0).all():
+        return -1
+    for k, step in enumerate(flow.steps):
+        if not (step.face_upper <= 0.0).all():
+            return k
+        fld = flow.fields[step.segment]
+        if step.end >= fld.end and step.segment + 1 < len(flow.fields):
+            after = flow.faces_at(step.end, step.p, step.G, step.segment + 1)
+            if not (after <= 0.0).all():
+                return k
+    return len(flow.steps)
+
+
 def slack_until(flow: Flow, instant: int) -> dict[str, float]:
     """Proved slack of every constraint on [0, times[instant]]."""
-    many: list[dict[str, float]] = []
     upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
-    many.append(_by_name(flow.fields[flow.first_segment].faces, upper))
+    least = by_name(flow.fields[flow.first_segment].faces, upper)
     for step in flow.steps[:instant]:
-        many.append(_by_name(flow.fields[step.segment].faces, step.face_upper))
-    return least_slack(many)
+        for name, value in by_name(flow.fields[step.segment].faces, step.face_upper).items():
+            least[name] = min(value, least.get(name, np.inf))
+    return least
 
 
-def _by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
+def by_name(names: Sequence[str], upper: Floats) -> dict[str, float]:
+    """Slack of each constraint from the upper bounds of its faces."""
     out: dict[str, float] = {}
     for name, value in zip(names, upper, strict=True):
         out[name] = min(-float(value), out.get(name, np.inf))
@@ -56,13 +74,6 @@ def proved_until(chain: Chain) -> float:
     """Seconds until which the constraints are proved; -1: not even at the start."""
     found = proved(chain)
     return float(found[-1][0].times[found[-1][1]]) if found else -1.0
-
-
-def lasting(flows: Sequence[Flow], tail: Tail) -> SafetyProof:
-    """The constraints for all time: over flows that lead to where a tail begins, and behind it."""
-    after = _by_name(flows[-1].fields[-1].faces, tail.face_upper)
-    tracking = np.max([tail.tracking, *(step.tracking for flow in flows for step in flow.steps)], axis=0)
-    return SafetyProof(least_slack([*(slack_until(f, len(f.steps)) for f in flows), after]), tail.start, tracking)
 
 
 def unproved(flow: Flow, proved: int) -> Unproved | None:
