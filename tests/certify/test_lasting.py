@@ -18,7 +18,8 @@ from modegraph.reach.tail.box import Tail
 def compiled(limit: float | None, dynamics: Any = lambda x, u: u - x, lo: float = 0.5) -> CompiledMode:
     mode = mg.Mode(
         "m", mg.System(dynamics, states=1, inputs=1), controller=lambda x: 0.0, reference=mg.setpoint([0.0]),
-        output=lambda x: x, start=mg.Box([lo], [1.0]), constraints=None if limit is None else lambda x: {"top": x[0] <= limit},
+        output=lambda x: x, start=mg.Box([lo], [1.0]),
+        constraints=None if limit is None else lambda x: {"top": x[0] <= limit},
     )  # fmt: skip
     return compile_mode(mode, None)
 
