@@ -12,7 +12,8 @@ from typing import Any, Generic, TypeVar
 
 Result = TypeVar("Result")
 
-COUNT = os.cpu_count() or 1
+COUNT = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+"""Cores that this process may use."""
 
 
 class Cores:
