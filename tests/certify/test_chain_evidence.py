@@ -95,3 +95,18 @@ def test_the_earliest_entry_is_that_of_the_chain_that_is_ahead() -> None:
     found = findings_of(Course(question, [common], park=False, common=True), [0], False, Past([[early], [late]]))
     assert 0.0 <= found.proofs[0].earliest <= 0.4 + np.log(2.0)
     assert found.proofs[0].latest >= 1.0 + np.log(2.0)
+
+
+def test_what_was_passed_counts() -> None:
+    """The slack of a constraint, and the first instant in the target, of the chains before the common flow too."""
+    near, far = flow_of(falling(0.2, 0.45), 0.0, 1.0), flow_of(falling(0.2, 0.3), 0.0, 1.0)
+    common = flow_of(falling(0.05, 0.2), 1.0, 5.0)
+    question = Question(falling(0.2, 0.4), {0: Goal(Region(mg.Box([-0.12], [0.12])), None)}, 5.0, NEVER)
+    for chains in ([[near], [far]], [[far], [near]]):
+        course = Course(question, [common], park=False, common=True, tail=None)
+        found = findings_of(course, [0], False, Past(chains))
+        # .45 at the entry, where the limit is .5.
+        assert found.proofs[0].slack["top"] <= 0.05
+        # .2 exp(-t) = .12
+        assert found.proofs[0].earliest <= np.log(0.2 / 0.12)
+        assert found.proofs[0].latest > 1.0

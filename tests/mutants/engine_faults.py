@@ -133,7 +133,7 @@ ENGINE_FAULTS = (
     ),
     Fault(
         "the last constraint face is skipped",
-        "certify/switching/common_time.py",
+        "certify/legal.py",
         "        if not (step.face_upper <= 0.0).all():",
         "        if not (step.face_upper[:-1] <= 0.0).all():",
         ("tests/certify/switching/test_common_time.py",),
@@ -148,15 +148,15 @@ ENGINE_FAULTS = (
     Fault(
         "the energy of the whole is that of its best part",
         "certify/proof.py",
-        "energy=max(p.energy for p in parts)",
-        "energy=min(p.energy for p in parts)",
+        "return max(e.energy for e in self.evidence)",
+        "return min(e.energy for e in self.evidence)",
         ("tests/certify/test_proof.py",),
     ),
     Fault(
         "an invariant set starts when its first part does",
         "certify/proof.py",
-        "tail_start=max(p.tail_start for p in parts)",
-        "tail_start=min(p.tail_start for p in parts)",
+        "return max(e.start for e in self.evidence)",
+        "return min(e.start for e in self.evidence)",
         ("tests/certify/test_proof.py",),
     ),
     Fault(
@@ -189,10 +189,10 @@ ENGINE_FAULTS = (
     ),
     Fault(
         "a funnel proves a switch behind flows that are not proved",
-        "certify/exploration.py",
-        " or any(proved_instants(f) < len(f.steps) for f in flows):",
-        ":",
-        ("tests/certify/test_exploration.py",),
+        "certify/chain_evidence.py",
+        "legal = all(proved_instants(f) == len(f.steps) for f in self.flows)",
+        "legal = True",
+        ("tests/certify/test_chain_evidence.py",),
     ),
     Fault(
         "a rung forgets what the disturbance holds",

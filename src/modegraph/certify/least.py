@@ -50,7 +50,8 @@ def least(relation: Relation, source: tuple[Floats, Floats], target: tuple[Float
             high = y_hi[:, None] - shift_lo[None, :, None]
             found.append(_least_gauges(low, high, flow.spread, limits, relation.goal.round))
             times.append(flow.times)
-            spent.append(flow.energy)
+            # Where no bound of the energy is known, any pair may have spent next to nothing.
+            spent.append(np.where(np.isfinite(flow.energy), flow.energy, 0.0))
         g = np.concatenate(found, axis=2)
         possible = g <= 1.0 + SLACK
         first = possible.argmax(axis=2)

@@ -87,8 +87,14 @@ class Moments:
         return lowest, highest
 
 
-def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int) -> Moments | None:
-    """The instants of a flow at which a switch may be proved; None where there is none."""
+def moments_of(
+    flow: Flow, target: TargetClass, horizon: float, classes: Sequence[tuple[float, float]]
+) -> Moments | None:
+    """The instants of a flow at which a switch may be proved; None where there is none.
+
+    ``classes``: ranges of the parameters of the source; of a flow they may be a part, whatever its piece says.
+    """
+    parameters = len(classes)
     usable = min(proved_instants(flow), int(np.searchsorted(flow.times, horizon, side="right")) - 1)
     if usable < 0:
         return None
@@ -117,7 +123,7 @@ def moments_of(flow: Flow, target: TargetClass, horizon: float, parameters: int)
     rows = np.einsum("fi,kij->kfj", target.rows, p[:, :, pure])
     used = rows.any(axis=(0, 1)) | (powers.sum(axis=1) == 0)
     return Moments(
-        lo, hi, all(flow.piece.lo[v] == -1.0 and flow.piece.hi[v] == 1.0 for v, _ in own),
+        lo, hi, all(lo[k] <= least and most <= hi[k] for k, (least, most) in enumerate(classes)),
         flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers[used],
         np.ascontiguousarray(rows[:, :, used]),
         np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(flow, target, rest, G),

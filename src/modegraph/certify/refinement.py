@@ -65,7 +65,7 @@ class Links:
         ]
 
     def _proofs(self, chain: Chain) -> list[Part | None]:
-        return [part_of(chain, goal, self.end, len(self.compiled.parameters)) for goal in self.goals]
+        return [part_of(chain, goal, self.end, self.compiled.parameters) for goal in self.goals]
 
     def refine(self, cuts: int, until: Deadline, progress: Callable[[str], None]) -> None:
         """Cut the starts where it helps, worst part first."""
@@ -172,8 +172,8 @@ class Links:
         return total, failing
 
 
-def part_of(chain: Chain, goal: TargetClass, end: float, parameters: int) -> Part | None:
+def part_of(chain: Chain, goal: TargetClass, end: float, classes: Sequence[tuple[float, float]]) -> Part | None:
     """What the flows of a chain prove of a target; None where they have no usable instant."""
-    moments = (moments_of(flow, goal, end, parameters) for flow, _ in proved(chain))
+    moments = (moments_of(flow, goal, end, classes) for flow, _ in proved(chain))
     found = [m for m in moments if m is not None]
     return Part(tuple(found)) if found else None

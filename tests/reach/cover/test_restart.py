@@ -190,3 +190,55 @@ def test_how_much_of_a_set_is_remainder(compiled: CompiledMode) -> None:
     flow.steps[0].G = np.zeros((n, n, 1))
     flow.steps[0].G[np.arange(n), np.arange(n), 0] = 1.0 + np.arange(n)
     assert filled_share(flow) == pytest.approx(0.5)
+
+
+@pytest.fixture(scope="module")
+def uncertain() -> CompiledMode:
+    """A spring of unknown stiffness, beside a constant that is known exactly and named last."""
+    plant = mg.System(
+        lambda x, u, w, d: np.array([x[1], -d["stiffness"] * x[0] - x[1] - x[0] ** 3 + 0.2 * w[0] + 0.0 * d["one"]]),
+        states=2, inputs=0, disturbance=mg.Box([-1.0], [1.0]), unknowns={"stiffness": (0.5, 4.5), "one": (1.0, 1.0)},
+    )  # fmt: skip
+    mode = mg.Mode(
+        "m", plant, controller=lambda x: np.zeros(0), reference=mg.setpoint([0.0]),
+        start=mg.Box([1.4, -0.1], [1.6, 0.1]),
+    )  # fmt: skip
+    return compile_mode(mode, None)
+
+
+@pytest.mark.parametrize("order", [[0, 1], [1, 0], [0, 1, 2, 3], [3, 0, 2, 1]])
+def test_parts_of_an_unknown_are_enclosed_together_for_all_of_it(uncertain: CompiledMode, order: list[int]) -> None:
+    """Each was restarted alone before: then its piece scales the unknown to a range of its own."""
+    stiffness = 2
+    pieces = uncertain.whole().split(stiffness)
+    if len(order) == 4:
+        pieces = [quarter for half in pieces for quarter in half.split(stiffness)]
+    alone = []
+    for k, piece in enumerate(pieces):
+        following = restarted([flow_of(uncertain, piece, 14)], uncertain.fields)
+        assert following is not None
+        for _ in range(2 + k):
+            assert following.advance(10.0)
+        assert following.piece.unknown_ranges[1][0] - following.piece.unknown_ranges[0][0] < 2.1
+        alone.append(following)
+    together = restarted([alone[k] for k in order], uncertain.fields)
+    assert together is not None
+    lo, hi = together.piece.unknown_ranges
+    assert lo[0] <= 0.5
+    assert hi[0] >= 4.5
+    assert (lo[1], hi[1]) == (1.0, 1.0)
+    assert together.time == max(flow.time for flow in alone)
+    spent = [float(f.seen_bounds.upper(f.steps[-1].energy)) + f.steps[-1].energy_radius for f in alone]
+    assert together.spent >= max(spent)
+    for flow in alone:
+        holds(together, points(flow))
+
+
+def test_what_all_have_spent_is_the_most_that_one_has(compiled: CompiledMode) -> None:
+    flows = [flow_of(compiled, piece, 10) for piece in compiled.whole().split(0)]
+    for k, spent in enumerate((3.0, 7.0)):
+        flows[k].steps[-1].energy_radius = spent
+    for order in (flows, flows[::-1]):
+        following = restarted(order, compiled.fields)
+        assert following is not None
+        assert following.spent >= 7.0
