@@ -9,8 +9,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modegraph.certify.evidence import lasting, proved, proved_until, sampled_violation, slack_until, width_over_time
+from modegraph.certify.evidence import (
+    lasting,
+    proved,
+    proved_until,
+    sampled_violation,
+    slack_until,
+    unproved,
+    width_over_time,
+)
 from modegraph.certify.proof import SafetyProof, certified_check, least_slack
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.common_time import proved_instants
@@ -27,6 +36,7 @@ from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.ladder import CURVED
+from modegraph.reach.failure import Mechanism
 from modegraph.reach.flow.flow import Order
 from modegraph.reach.flowpipe import DEFAULT_HORIZON, Cutting
 from modegraph.reach.start.piece import Chart, Piece
@@ -42,12 +52,12 @@ PROGRESS = 1.05
 
 @dataclass(frozen=True)
 class ClassResult:
-    """Relations parallel to the targets (a text where there can be none), and the check of the whole class.
+    """Relations parallel to the targets (a reason where there can be none), and the check of the whole class.
 
     ``slack``: of the constraints, until the last instant any of the relations uses.
     """
 
-    relations: list[Relation | str]
+    relations: list[Relation | Reason]
     check: Verdict
     slack: dict[str, float]
     horizon: float
@@ -82,17 +92,17 @@ def relate(
     if thorough:
         links.refine(deadline, progress)
     known = iter(links.relations)
-    relations = [goal if isinstance(goal, str) else next(known) for goal in goals]
+    relations = [goal if isinstance(goal, Reason) else next(known) for goal in goals]
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
     return ClassResult(relations, _check(compiled, links.chains), slack, end)
 
 
-def _goal(spec: TargetSpec, plant: int) -> TargetClass | str:
+def _goal(spec: TargetSpec, plant: int) -> TargetClass | Reason:
     """A target of the relations, or why it cannot be one."""
     try:
         return target_class(spec.mode, spec.p, plant)
     except ModegraphError as error:
-        return str(error)
+        return Reason(Outcome.UNUSABLE_TARGET, text=str(error))
 
 
 def _legal_chains(compiled: CompiledMode, end: float, deadline: float, progress: Callable[[str], None]) -> list[Chain]:
@@ -168,15 +178,24 @@ def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
         # A linear loop has a solution for all time, and there is nothing else to prove.
         return replace(certified_check(SafetyProof({}, until, np.full(last.outputs, np.inf))), widths=widths)
     if until < 0.0:
-        reason = "the constraints are not proved at the start for all references of the class"
-        return Verdict(Status.UNDECIDED, reason, until=0.0, widths=widths)
+        reason = Reason(Outcome.START_NOT_PROVED, whole_class=True)
+        return Verdict(Status.UNDECIDED, (reason, *_in_the_way(chains)), until=0.0, widths=widths)
     tail = _tail(compiled, chains)
     if isinstance(tail, Tail):
         return replace(
             certified_check(lasting([flow for chain in chains for flow in chain.flows], tail)), widths=widths
         )
-    reason = f"constraints proved until t = {until:.4g} s for all references of the class, not for ever: {tail.reason}"
-    return Verdict(Status.UNDECIDED, reason, until=until, widths=widths)
+    reason = Reason(Outcome.NOT_FOR_EVER, until=until, why=tail, whole_class=True)
+    return Verdict(Status.UNDECIDED, (reason, *_in_the_way(chains)), until=until, widths=widths)
+
+
+def _in_the_way(chains: Sequence[Chain]) -> list[Reason]:
+    """What ended the chain that ends first: a constraint, or the flow itself; nothing where all go to their end."""
+    worst = min(chains, key=proved_until)
+    broken = next((flow for flow in worst.flows if proved_instants(flow) < len(flow.steps)), None)
+    breach = None if broken is None else unproved(broken, proved_instants(broken))
+    why = [] if breach is None else [breach.reason]
+    return why + ([] if worst.failure is None else [Reason(Outcome.FLOWPIPE_ENDED, failure=worst.failure)])
 
 
 def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure:
@@ -185,7 +204,7 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
     for chain in chains:
         flow = chain.flows[-1]
         if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
-            return TailFailure("the flowpipe ends before the loop has settled")
+            return TailFailure(Mechanism.ENDS_BEFORE_SETTLED)
         order = Order(1, 0) if compiled.linear else _tail_order(chain)
         search = TailSearch(
             flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
@@ -194,7 +213,7 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         if isinstance(tail, TailFailure):
             return tail
         if not (tail.face_upper <= 0.0).all():
-            return TailFailure("a constraint cannot be proved on the invariant set")
+            return TailFailure(Mechanism.CONSTRAINT_IN_TAIL)
         found.append(tail)
     return Tail(
         max(tail.start for tail in found),

@@ -6,8 +6,9 @@ import time
 from collections.abc import Sequence
 
 from modegraph.certify.exploration import Exploration
-from modegraph.certify.findings import Findings, settle
+from modegraph.certify.findings import Findings, ended, settle
 from modegraph.certify.proof import safe_together, together
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import Flow
 from modegraph.reach.start.piece import Piece
 
@@ -78,7 +79,8 @@ class Decision:
         before = [part.parked for part in open_chains]
         following = exploration.continued[ends[0]] if len(ends) == 1 else exploration.again(ends, exploration.end())
         if following is None:
-            part = Findings(flow=ends[0], last=ends[-1], failure="the reach set cannot be enclosed again")
+            failure = Failure(Mechanism.NOT_ENCLOSED_AGAIN, time=max(flow.time for flow in ends))
+            part = Findings(flow=ends[0], last=ends[-1], failure=ended(failure))
         else:
             part = exploration.follow([following], before, found, park=False)
         missing = [j for j in found.waiting if j not in part.proofs and any(j not in c.proofs for c in open_chains)]
@@ -99,4 +101,4 @@ class Decision:
             found.safety = safe_together([*found.waiting_safety, *(part.safety for part in parts)])
         for part in parts:
             found.failure, found.unproved = part.failure, part.unproved
-            found.tail_reason, found.safe_until = part.tail_reason, max(found.safe_until, part.safe_until)
+            found.no_tail, found.safe_until = part.no_tail, max(found.safe_until, part.safe_until)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.evidence import lasting, sampled_violation, set_size, slack_until, unproved
-from modegraph.certify.findings import Findings, better, filled, merge, too_wide
+from modegraph.certify.findings import Findings, NoTail, better, ended, filled, merge
 from modegraph.certify.proof import SafetyProof, SwitchProof, least_slack
 from modegraph.certify.switching.common_time import Missed, Reach, find_crossings, proved_instants, widest_variable
 from modegraph.certify.switching.funnel import Arrival, Funnels, Sinking
@@ -22,6 +22,7 @@ from modegraph.enclosure.monomials import monomial_count
 from modegraph.expression.tape import Tape
 from modegraph.reach.cover.cuts import nonlinear_variable, parts_of_refused
 from modegraph.reach.cover.restart import WIDE_GAP, filled_share, restarted
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.field import Field
 from modegraph.reach.flow.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow, Order
 from modegraph.reach.parallelotope import mode_gap
@@ -59,12 +60,12 @@ LONGEST = 1000.0
 class Course:
     """How far a chain of flows was followed.
 
-    ``tail``, or the ``reason`` there is none; whether the (first) flow wants to be restarted (``parked``);
+    ``tail``, or why there is none (``no_tail``); whether the (first) flow wants to be restarted (``parked``);
     the least gauge of each target at the looks, and when that was (``nearest``).
     """
 
     tail: Tail | Sinking | None = None
-    reason: str = ""
+    no_tail: NoTail = ()
     parked: bool = False
     nearest: dict[int, tuple[float, float]] = field(default_factory=dict)
 
@@ -158,7 +159,8 @@ class Exploration:
         part = self.follow([self.continued[flow]], [[flow]], found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
-            found.unpark(part.failure or str(part.unproved or "") or filled(part.last))
+            breach = None if part.unproved is None else part.unproved.reason
+            found.unpark(part.failure or breach or filled(part.last))
             return
         self.chains[flow] = part
 
@@ -233,7 +235,7 @@ class Exploration:
         if course.parked and proved_instants(flow) == len(flow.steps):
             if self.common and flow.feedback > TOO_MUCH_FEEDBACK:
                 self.refused = found.refused = True
-                found.failure = too_wide(filled(flow))
+                found.failure = filled(flow)
                 return found
             found.parked = [flow]
             found.waiting = {j: [] for j in wanted if j not in found.proofs}
@@ -301,13 +303,14 @@ class Exploration:
                 if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
                     course.tail, decay = outcome, outcome.decay
                 else:
-                    course.reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
+                    missed = Failure(Mechanism.CONSTRAINT_IN_TAIL) if isinstance(outcome, Tail) else outcome
+                    course.no_tail = (missed,)
                     sunk = self._sink(flow, pending) if not pending else None
                     if isinstance(sunk, Sinking):
                         course.tail, decay = sunk, sunk.tail().decay
-                    elif sunk is not None and sunk.reason.partition(":")[0] not in course.reason:
+                    elif sunk is not None and sunk.mechanism is not missed.mechanism:
                         # Not the same again with other numbers.
-                        course.reason = f"{course.reason}; no funnel either: {sunk.reason}"
+                        course.no_tail = (missed, sunk)
                 tried = size
             if not pending and (course.tail is not None or not safety):
                 break
@@ -398,13 +401,13 @@ class Exploration:
         The first starts around the ends of the chains ``before``, if there are any.
         """
         flow = flows[-1]
-        found = Findings(flow=flows[0], last=flow, tail_reason=course.reason)
+        found = Findings(flow=flows[0], last=flow, no_tail=course.no_tail)
         tail = course.tail
         # The first flow that is not proved to its end, if there is one.
         short = next((f for f in flows if proved_instants(f) < len(f.steps)), flow)
         proved = proved_instants(short)
         if flow.failure is not None:
-            found.failure = str(flow.failure)
+            found.failure = ended(flow.failure)
         if proved < len(short.steps):
             found.unproved = unproved(short, proved)
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)
@@ -482,6 +485,7 @@ class Exploration:
             slack=least_slack([*slack, sinking.slack()]),
             parts=1,
             nearest=arrival.nearest,
+            sinks=True,
         )
 
     def _safety(

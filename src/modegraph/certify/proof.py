@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.switching.common_time import Nearest
 from modegraph.certify.verdict import Floats, Status, Verdict
 
@@ -28,6 +29,8 @@ class SwitchProof:
     parts: int
     nearest: Nearest | None = field(default=None, compare=False)
     """The part with the least margin, at its best instant."""
+    sinks: bool = False
+    """Some starts are there only when they have sunk in a funnel."""
 
     def __post_init__(self) -> None:
         numbers = (self.earliest, self.latest, self.margin, self.window, self.energy)
@@ -73,6 +76,7 @@ def together(proofs: Sequence[SwitchProof | None]) -> SwitchProof | None:
         slack=least_slack(p.slack for p in parts),
         parts=sum(p.parts for p in parts),
         nearest=min(parts, key=lambda p: p.margin).nearest,
+        sinks=any(p.sinks for p in parts),
     )
 
 
@@ -91,13 +95,13 @@ def safe_together(proofs: Sequence[SafetyProof | None]) -> SafetyProof | None:
 def certified_switch(proof: SwitchProof, horizon: float | None) -> Verdict:
     """The verdict of a complete proof of condition (C)."""
     if proof.latest == 0.0:
-        reason = "every start is already in the target: a switch in zero time"
+        reason = Reason(Outcome.ZERO_TIME)
     else:
-        pieces = "" if proof.parts == 1 else f", in {proof.parts} pieces with a time each"
-        reason = f"every start is in the target by {proof.latest:.4g} s{pieces}; constraints proved until then"
+        outcome = Outcome.FUNNEL if proof.sinks else Outcome.COMMON_TIME
+        reason = Reason(outcome, latest=proof.latest, parts=proof.parts)
     return Verdict(
         Status.CERTIFIED,
-        reason,
+        (reason,),
         time=(proof.earliest, proof.latest),
         margin=proof.margin,
         slack=dict(proof.slack),
@@ -109,11 +113,10 @@ def certified_switch(proof: SwitchProof, horizon: float | None) -> Verdict:
 
 def certified_check(proof: SafetyProof) -> Verdict:
     """The verdict of a complete proof of Assumption 1."""
-    text = "constraints proved for all t >= 0" if proof.slack else "no constraints; the flow exists for all t >= 0"
     tracking = proof.tracking if proof.tracking.size and np.isfinite(proof.tracking).all() else None
     return Verdict(
         Status.CERTIFIED,
-        f"{text} (invariant set from t = {proof.tail_start:.4g} s on)",
+        (Reason(Outcome.FOR_ALL_TIME, start=proof.tail_start, constraints=bool(proof.slack)),),
         slack=dict(proof.slack),
         tracking=tracking,
     )
@@ -121,7 +124,4 @@ def certified_check(proof: SafetyProof) -> Verdict:
 
 def only_entered(name: str) -> Verdict:
     """What stands for Assumption 1 at a `Target`: it is entered and never left, so nothing is asked of it."""
-    return Verdict(
-        Status.CERTIFIED,
-        f"target {name!r} is only entered: the constraints are proved up to the entry, nothing after it",
-    )
+    return Verdict(Status.CERTIFIED, (Reason(Outcome.ONLY_ENTERED, target=name),))

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from modegraph.certify.class_unit import relate
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
@@ -115,13 +116,15 @@ class _Unit:
     """Nodes to which there is a relation: one of both is a continuous class."""
     linked: tuple[TargetSpec, ...] = ()
 
-    def undecided(self, reason: str) -> _Result:
-        nothing = Verdict(Status.UNDECIDED, reason, horizon=self.horizon)
+    def undecided(self, reason: Reason) -> _Result:
+        nothing = Verdict(Status.UNDECIDED, (reason,), horizon=self.horizon)
         return _Result(UnitResult([nothing] * len(self.targets), nothing), self.links(reason))
 
-    def links(self, relations: Sequence[Relation | str] | str, slack: Any = None) -> dict[tuple[Node, Node], Link]:
-        """Links to ``linked_nodes``; one text for all where nothing is known."""
-        many = [relations] * len(self.linked_nodes) if isinstance(relations, str) else relations
+    def links(
+        self, relations: Sequence[Relation | Reason] | Reason, slack: Any = None
+    ) -> dict[tuple[Node, Node], Link]:
+        """Links to ``linked_nodes``; one reason for all where nothing is known."""
+        many = [relations] * len(self.linked_nodes) if isinstance(relations, Reason) else relations
         return {
             (self.node, node): Link(relation, slack or {}, self.horizon)
             for node, relation in zip(self.linked_nodes, many, strict=True)
@@ -286,13 +289,13 @@ class _Work:
             with one_core():
                 now = time.monotonic()
                 if now >= self.end:
-                    return unit.undecided(f"the budget of {self.budget:g} s ended before this mode was examined")
+                    return unit.undecided(Reason(Outcome.NOT_BEGUN, budget=self.budget))
                 deadline = now + (self.end - now) / rounds
                 return _examined(unit, deadline, progress, self.thorough)
         except (ModegraphError, _Stopped):
             raise
         except Exception as error:
-            return unit.undecided(f"the proof engine stopped with {type(error).__name__}: {error}")
+            return unit.undecided(Reason(Outcome.ENGINE_STOPPED, error=type(error).__name__, text=str(error)))
 
     @staticmethod
     def _result(future: Future[_Result], unit: _Unit) -> _Result:
@@ -302,4 +305,4 @@ class _Work:
                 return future.result()
             if not isinstance(error, _Stopped):
                 raise error
-        return unit.undecided("interrupted before this mode was examined")
+        return unit.undecided(Reason(Outcome.INTERRUPTED))
