@@ -16,10 +16,10 @@ from modegraph.model.mode import Mode
 from modegraph.model.reference import setpoint
 from modegraph.model.sets import Box
 from modegraph.model.target import Target
-from tests.graph.fakes import PLANT, certified, mode
+from tests.graph.fakes import PLANT, because, certified, mode
 
 Engine = Any
-SETTLED = Verdict(Status.CERTIFIED, "for all time")
+SETTLED = Verdict(Status.CERTIFIED, because("for all time"))
 
 
 @pytest.fixture
@@ -42,8 +42,10 @@ def test_units_targets_and_their_place_in_the_graph(engine: Engine) -> None:
     def fake(mode: Any, p: Any, targets: Any, *, horizon: Any, deadline: float, progress: Any) -> UnitResult:
         asked.append((mode.name, float(p[0]), [(t.name, None if t.p is None else float(t.p[0])) for t in targets]))
         assert deadline > time.monotonic()
-        verdicts = [Verdict(Status.UNDECIDED, f"{mode.name}{p} to {t.name}{t.p}", horizon=horizon) for t in targets]
-        return UnitResult(verdicts=verdicts, check=Verdict(Status.CERTIFIED, f"check {mode.name}{p}"))
+        verdicts = [
+            Verdict(Status.UNDECIDED, because(f"{mode.name}{p} to {t.name}{t.p}"), horizon=horizon) for t in targets
+        ]
+        return UnitResult(verdicts=verdicts, check=Verdict(Status.CERTIFIED, because(f"check {mode.name}{p}")))
 
     engine(fake)
     dock = Target("dock", Box([0], [1]))

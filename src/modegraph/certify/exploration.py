@@ -159,8 +159,7 @@ class Exploration:
         part = self.follow([self.continued[flow]], [[flow]], found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
-            breach = None if part.unproved is None else part.unproved.reason
-            found.unpark(part.failure or breach or filled(part.last))
+            found.unpark(part.failure or part.unproved or filled(part.last))
             return
         self.chains[flow] = part
 
@@ -406,8 +405,7 @@ class Exploration:
         # The first flow that is not proved to its end, if there is one.
         short = next((f for f in flows if proved_instants(f) < len(f.steps)), flow)
         proved = proved_instants(short)
-        if flow.failure is not None:
-            found.failure = ended(flow.failure)
+        found.failure = None if flow.failure is None else ended(flow.failure)
         if proved < len(short.steps):
             found.unproved = unproved(short, proved)
             found.broken = len(flows) == 1 and not before and sampled_violation(flow)

@@ -41,10 +41,10 @@ class Findings:
     """Goals that depend on the parked flows, with the proofs of the other parts."""
     waiting_safety: list[SafetyProof] | None = None
 
-    def unpark(self, why: Reason) -> None:
+    def unpark(self, why: Reason | Unproved) -> None:
         """Nothing waits any more: the part is too large, for this reason."""
         self.parked, self.waiting, self.waiting_safety = [], {}, None
-        self.failure = Reason(Outcome.TOO_LARGE, why=why)
+        self.failure = Reason(Outcome.TOO_LARGE, why=why.reason if isinstance(why, Unproved) else why)
 
 
 def ended(failure: Failure) -> Reason:
