@@ -17,6 +17,7 @@ from modegraph.certify.verdict import Status, Verdict
 from modegraph.cli import app
 from modegraph.graph import build as build_module
 from modegraph.model_file import shipped_example
+from tests.graph.fakes import because
 
 MODEL = """
 import numpy as np
@@ -43,13 +44,13 @@ def engine(monkeypatch: pytest.MonkeyPatch) -> dict[Any, Verdict]:
     """Verdicts by (source, target) and checks by name; slow -> fast is certified, the rest refuted."""
     answers: dict[Any, Verdict] = {
         ("slow", "fast"): Verdict(
-            Status.CERTIFIED, "proved", time=(0.0, 4.0), margin=float("inf"), energy=float("nan")
+            Status.CERTIFIED, because("proved"), time=(0.0, 4.0), margin=float("inf"), energy=float("nan")
         ),
     }
 
     def certify(mode: Any, p: Any, targets: Any, **_: Any) -> UnitResult:
-        refuted = Verdict(Status.REFUTED, "stays outside [1, 2]")
-        settled = Verdict(Status.CERTIFIED, "for all time")
+        refuted = Verdict(Status.REFUTED, because("stays outside [1, 2]"))
+        settled = Verdict(Status.CERTIFIED, because("for all time"))
         return UnitResult(
             verdicts=[answers.get((mode.name, t.name), refuted) for t in targets],
             check=answers.get(mode.name, settled),
@@ -99,7 +100,7 @@ def test_build_json(model: str) -> None:
 
 @pytest.mark.parametrize(("status", "code"), [(Status.CERTIFIED, 0), (Status.REFUTED, 1), (Status.UNDECIDED, 3)])
 def test_check_exit_codes(model: str, engine: Any, status: Status, code: int) -> None:
-    engine["fast"] = Verdict(status, "because")
+    engine["fast"] = Verdict(status, because("because"))
     result = run("check", model)
     assert result.exit_code == code
     assert "because" in result.stdout or status is Status.CERTIFIED
@@ -118,7 +119,7 @@ def test_plan(model: str) -> None:
 
 
 def test_plan_options(model: str, engine: Any) -> None:
-    good = Verdict(Status.CERTIFIED, "proved", time=(0.0, 1.0), margin=0.5, energy=1.0)
+    good = Verdict(Status.CERTIFIED, because("proved"), time=(0.0, 1.0), margin=0.5, energy=1.0)
     engine.update({("slow", "far"): good, ("far", "fast"): good})
 
     def modes(*options: str) -> list[str]:
@@ -147,7 +148,7 @@ def test_plan_exit_codes_where_there_is_no_plan(model: str, engine: Any) -> None
     no = run(*ask)
     assert no.exit_code == 1
     assert "no undecided pair could help" in no.stderr
-    engine["fast", "slow"] = Verdict(Status.UNDECIDED, "too wide")
+    engine["fast", "slow"] = Verdict(Status.UNDECIDED, because("too wide"))
     open_ = run(*ask, "--json")
     assert open_.exit_code == 3
     data = loads(open_.stdout)

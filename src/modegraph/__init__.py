@@ -13,6 +13,7 @@ from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
 
 if TYPE_CHECKING:
     from modegraph.certify.largest_start import largest_start
+    from modegraph.certify.reason import Outcome, Reason
     from modegraph.certify.references import References
     from modegraph.certify.verdict import Status, Verdict, Witness
     from modegraph.explain.explanation import Explanation
@@ -50,9 +51,11 @@ __all__ = [
     "ModeGraph",
     "ModegraphError",
     "NotBuiltYet",
+    "Outcome",
     "Plan",
     "Points",
     "Polytope",
+    "Reason",
     "References",
     "Repair",
     "Run",
@@ -85,9 +88,11 @@ _HOME = {
     "Memory": "model.memory",
     "Mode": "model.mode",
     "ModeGraph": "graph.modegraph",
+    "Outcome": "certify.reason",
     "Plan": "plan.plan",
     "Points": "model.reference",
     "Polytope": "model.sets.polytope",
+    "Reason": "certify.reason",
     "References": "certify.references",
     "Repair": "explain.repairs",
     "Run": "run.simulate",

@@ -14,13 +14,6 @@ _LOG = logging.getLogger("modegraph")
 _LOG.addHandler(logging.NullHandler())
 
 
-def stopped(error: Exception) -> str:
-    """What an error of the engine is for a person: a limit that it names, or a fault of its own."""
-    if isinstance(error, ModegraphError):
-        return str(error)
-    return f"the proof engine stopped with {type(error).__name__}: {error}"
-
-
 def note(what: str, error: Exception) -> None:
     """Log an error of the engine that was met in ``what``, with its traceback."""
     if not isinstance(error, ModegraphError):

@@ -13,6 +13,7 @@ from modegraph.explain.explain import Explanation
 from modegraph.explain.repairs import RepairSearch
 from modegraph.report.tables import explanation_data
 from tests.certify.class_graphs import double_integrators
+from tests.graph.fakes import because
 from tests.graph.fakes import graph as fake
 
 CERTIFIED = mg.Status.CERTIFIED
@@ -331,7 +332,7 @@ def test_an_interrupt_keeps_what_was_found(monkeypatch: pytest.MonkeyPatch) -> N
 def test_what_build_does_not_confirm_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     from modegraph.explain.pair import Pair
 
-    undecided = mg.Verdict(mg.Status.UNDECIDED, "lost")
+    undecided = mg.Verdict(mg.Status.UNDECIDED, because("lost"))
     monkeypatch.setattr(Pair, "built", lambda self, deadline: undecided)
     told = mg.build([decay(mg.Box([-1.0], [1.0])), home()], horizon=1.0).explain("decay", "home")
     assert told.repairs == ()
@@ -339,7 +340,7 @@ def test_what_build_does_not_confirm_is_not_told(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_hand_made_graph_is_explained_as_far_as_it_goes() -> None:
-    g = fake("ab", {("a", "b"): mg.Verdict(mg.Status.UNDECIDED, "the budget ended")})
+    g = fake("ab", {("a", "b"): mg.Verdict(mg.Status.UNDECIDED, because("the budget ended"))})
     told: Explanation = g.explain("a", "b")
     assert any("examined by itself the switch is certified" in note for note in told.notes)
 

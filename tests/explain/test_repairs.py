@@ -9,9 +9,10 @@ import pytest
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.errors import ModegraphError
 from modegraph.explain.repairs import DIGITS, _Bracket, attempt, rounded
+from tests.graph.fakes import because
 
-UNDECIDED = Verdict(Status.UNDECIDED, "lost", margin=-0.5)
-CERTIFIED = Verdict(Status.CERTIFIED, "proved", time=(0.0, 1.0), margin=0.25)
+UNDECIDED = Verdict(Status.UNDECIDED, because("lost"), margin=-0.5)
+CERTIFIED = Verdict(Status.CERTIFIED, because("proved"), time=(0.0, 1.0), margin=0.25)
 
 
 @pytest.mark.parametrize("value", [1.0, 0.1, 1.23456, 9.99996, 123456.0, 1.0001e-7, 2.5])

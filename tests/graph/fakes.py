@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from modegraph.certify.reason import Outcome, Reason, Why
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.model.mode import Mode
@@ -15,10 +16,16 @@ from modegraph.model.sets import Box
 from modegraph.model.system import System
 from modegraph.model.target import Target
 
+
+def because(text: str) -> Why:
+    """A made-up reason."""
+    return (Reason(Outcome.ENGINE_LIMIT, text=text),)
+
+
 PLANT = System(lambda x, u: np.array([u[0]]), states="x", inputs="u")
 
-REFUTED = Verdict(Status.REFUTED, "it leaves X")
-UNDECIDED = Verdict(Status.UNDECIDED, "the budget ended", margin=-0.1)
+REFUTED = Verdict(Status.REFUTED, because("it leaves X"))
+UNDECIDED = Verdict(Status.UNDECIDED, because("the budget ended"), margin=-0.1)
 
 
 def certified(
@@ -29,7 +36,7 @@ def certified(
     margin: float | None = 0.5,
     **more: Any,
 ) -> Verdict:
-    return Verdict(Status.CERTIFIED, "proved", time=(earliest, latest), energy=energy, margin=margin, **more)
+    return Verdict(Status.CERTIFIED, because("proved"), time=(earliest, latest), energy=energy, margin=margin, **more)
 
 
 def mode(name: str, points: int = 1, radius: float = 0.5) -> Mode:
@@ -60,7 +67,7 @@ def graph(
     for (i, j), verdict in verdicts.items():
         pairs = [(a, b) for a in nodes for b in nodes if a != b and i in (a, a[0]) and j in (b, b[0])]
         table.update(dict.fromkeys(pairs, verdict))
-    settled = Verdict(Status.CERTIFIED, "for all time")
+    settled = Verdict(Status.CERTIFIED, because("for all time"))
     answers = {node: settled for node in nodes if node[0] not in targets}
     for key, verdict in (checks or {}).items():
         answers.update({node: verdict for node in answers if key in (node, node[0])})

@@ -4,18 +4,18 @@ import numpy as np
 
 from modegraph.certify.verdict import Status, Verdict, Witness
 from modegraph.graph.aggregate import every_member, some_pair
-from tests.graph.fakes import certified
+from tests.graph.fakes import because, certified
 
 P = [np.array([0.0]), np.array([1.0]), np.array([2.0])]
 WITNESS = Witness(np.array([0.1]), None, {}, 2.0, "horizon")
 
 
 def refuted(margin: float | None = None, horizon: float | None = None) -> Verdict:
-    return Verdict(Status.REFUTED, "stays outside", margin=margin, witness=WITNESS, horizon=horizon)
+    return Verdict(Status.REFUTED, because("stays outside"), margin=margin, witness=WITNESS, horizon=horizon)
 
 
 def undecided(margin: float | None = None, until: float | None = None) -> Verdict:
-    return Verdict(Status.UNDECIDED, "too wide", margin=margin, until=until)
+    return Verdict(Status.UNDECIDED, because("too wide"), margin=margin, until=until)
 
 
 def test_one_certified_pair_is_enough_and_the_figures_hold_for_all_certified_pairs() -> None:
@@ -67,8 +67,8 @@ def test_a_single_pair_keeps_its_reason_and_names_the_references_of_its_witness(
 
 
 def test_a_check_is_for_every_member() -> None:
-    good = Verdict(Status.CERTIFIED, "proved", slack={"u": 1.0}, tracking=np.array([0.1, 0.4]))
-    better = Verdict(Status.CERTIFIED, "proved", slack={"u": 2.0}, tracking=np.array([0.2, 0.3]))
+    good = Verdict(Status.CERTIFIED, because("proved"), slack={"u": 1.0}, tracking=np.array([0.1, 0.4]))
+    better = Verdict(Status.CERTIFIED, because("proved"), slack={"u": 2.0}, tracking=np.array([0.2, 0.3]))
     both = every_member([(P[0], good), (P[1], better)])
     assert both.status is Status.CERTIFIED
     assert both.slack == {"u": 1.0}

@@ -18,11 +18,11 @@ from modegraph.model.mode import Mode
 from modegraph.model.reference import setpoint
 from modegraph.model.sets import Box
 from modegraph.model.target import Target
-from tests.graph.fakes import PLANT, certified, mode
+from tests.graph.fakes import PLANT, because, certified, mode
 
 Engine = Any
 BEGUN = 1000.0
-SETTLED = Verdict(Status.CERTIFIED, "for all time")
+SETTLED = Verdict(Status.CERTIFIED, because("for all time"))
 
 
 @pytest.fixture
@@ -67,8 +67,10 @@ def test_units_targets_and_their_place_in_the_graph(engine: Engine) -> None:
     def fake(mode: Any, p: Any, targets: Any, *, horizon: Any, deadline: Deadline, progress: Any) -> UnitResult:
         asked.append((mode.name, float(p[0]), [(t.name, None if t.p is None else float(t.p[0])) for t in targets]))
         assert not deadline.is_over
-        verdicts = [Verdict(Status.UNDECIDED, f"{mode.name}{p} to {t.name}{t.p}", horizon=horizon) for t in targets]
-        return UnitResult(verdicts=verdicts, check=Verdict(Status.CERTIFIED, f"check {mode.name}{p}"))
+        verdicts = [
+            Verdict(Status.UNDECIDED, because(f"{mode.name}{p} to {t.name}{t.p}"), horizon=horizon) for t in targets
+        ]
+        return UnitResult(verdicts=verdicts, check=Verdict(Status.CERTIFIED, because(f"check {mode.name}{p}")))
 
     engine(fake)
     dock = Target("dock", Box([0], [1]))
@@ -161,7 +163,7 @@ def test_what_its_share_cut_short_is_done_once_more(
         asked.append(mode.name)
         if mode.name == "m1" and deadline.left < 100.0:
             clock.work(deadline)
-            nothing = Verdict(Status.UNDECIDED, "the budget ended")
+            nothing = Verdict(Status.UNDECIDED, because("the budget ended"))
             return UnitResult([certified(), *[nothing] * (len(targets) - 1)], nothing)
         return everything(mode, p, targets)
 
@@ -182,7 +184,9 @@ def test_when_the_budget_is_over_nothing_is_done_again(
     def fake(mode: Any, p: Any, targets: Any, *, deadline: Deadline, **_: Any) -> UnitResult:
         asked.append(mode.name)
         clock.work(deadline)
-        return UnitResult([Verdict(Status.UNDECIDED, "late") for _ in targets], Verdict(Status.UNDECIDED, "late"))
+        return UnitResult(
+            [Verdict(Status.UNDECIDED, because("late")) for _ in targets], Verdict(Status.UNDECIDED, because("late"))
+        )
 
     engine(fake)
     build([mode("a"), mode("b")], budget=10.0)

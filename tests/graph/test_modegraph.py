@@ -11,7 +11,7 @@ from modegraph.model.mode import Mode
 from modegraph.model.reference import setpoint
 from modegraph.model.sets import Box
 from modegraph.model.target import Target
-from tests.graph.fakes import PLANT, UNDECIDED, certified, graph, mode
+from tests.graph.fakes import PLANT, UNDECIDED, because, certified, graph, mode
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def small() -> ModeGraph:
             (("b", 0), ("b", 1)): UNDECIDED,
             (("b", 0), "dock"): certified(0.0),
         },
-        {("b", 1): Verdict(Status.UNDECIDED, "no tail", until=3.0)},
+        {("b", 1): Verdict(Status.UNDECIDED, because("no tail"), until=3.0)},
     )
 
 
@@ -113,7 +113,9 @@ def test_explain_tells_reason_figures_and_counterexample() -> None:
     g = graph(
         "ab",
         {
-            ("a", "b"): Verdict(Status.REFUTED, "never arrives [really]", margin=-0.5, witness=witness, horizon=9.0),
+            ("a", "b"): Verdict(
+                Status.REFUTED, because("never arrives [really]"), margin=-0.5, witness=witness, horizon=9.0
+            ),
             ("b", "a"): certified(2.0, slack={"speed": 0.25}, window=1.0),
         },
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from modegraph.certify.verdict import Status, Verdict, Witness
 from modegraph.plan.as_json import json_text, plain, plan_data, switch_data, verdict_data
-from tests.graph.fakes import certified, graph, mode
+from tests.graph.fakes import because, certified, graph, mode
 
 
 def test_plain_data_has_no_arrays_and_no_number_that_json_lacks() -> None:
@@ -20,7 +20,7 @@ def test_plain_data_has_no_arrays_and_no_number_that_json_lacks() -> None:
 
 def test_a_verdict_has_all_its_attributes_as_keys() -> None:
     witness = Witness(x0=np.array([1.0]), w=None, d={"m": 2.0}, r_i=None, r_j=np.array([3.0]), time=4.0, kind="trapped")
-    data = plain(verdict_data(Verdict(Status.REFUTED, "no", witness=witness, horizon=5.0)))
+    data = plain(verdict_data(Verdict(Status.REFUTED, because("no"), witness=witness, horizon=5.0)))
     assert data["status"] == "refuted"
     assert data["horizon"] == 5.0
     assert data["witness"] == {

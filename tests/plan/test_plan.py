@@ -9,7 +9,7 @@ import pytest
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.plan.plan import Plan, rounded_up
-from tests.graph.fakes import certified, graph, mode
+from tests.graph.fakes import because, certified, graph, mode
 
 
 def chain(**checks: Verdict) -> Plan:
@@ -46,16 +46,16 @@ def test_rounding_up_is_the_next_double_at_most() -> None:
 
 def test_a_goal_not_certified_for_all_time_carries_a_warning() -> None:
     assert chain().warnings == ()
-    undecided = chain(c=Verdict(Status.UNDECIDED, "no tail was found", until=4.0))
+    undecided = chain(c=Verdict(Status.UNDECIDED, because("no tail was found"), until=4.0))
     assert undecided.goal_check.until == 4.0
     assert "proved until 4 s" in undecided.warnings[0]
     assert "no tail was found" in str(undecided)
-    refuted = chain(c=Verdict(Status.REFUTED, "speed is violated"))
+    refuted = chain(c=Verdict(Status.REFUTED, because("speed is violated")))
     assert "do not hold" in refuted.warnings[0]
 
 
 def test_json_has_the_attribute_names_and_no_nan() -> None:
-    plan = chain(c=Verdict(Status.UNDECIDED, "why", margin=float("nan"), until=float("inf")))
+    plan = chain(c=Verdict(Status.UNDECIDED, because("why"), margin=float("nan"), until=float("inf")))
     data = json.loads(plan.to_json(), parse_constant=pytest.fail)
     for key in ("modes", "switches", "energy", "margin", "warnings"):
         assert key in data

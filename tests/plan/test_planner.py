@@ -9,7 +9,7 @@ from modegraph.errors import ModegraphError, Unreachable
 from modegraph.graph.modegraph import ModeGraph
 from modegraph.model.sets import Box
 from modegraph.model.target import Target
-from tests.graph.fakes import UNDECIDED, certified, graph, mode
+from tests.graph.fakes import UNDECIDED, because, certified, graph, mode
 
 
 @pytest.fixture
@@ -209,7 +209,9 @@ def test_energy_bounds_that_are_missing_come_last_and_are_told() -> None:
 
 
 def test_only_certified_pairs_are_used() -> None:
-    g = graph("abc", {("a", "b"): UNDECIDED, ("b", "c"): certified(), ("a", "c"): Verdict(Status.REFUTED, "no")})
+    g = graph(
+        "abc", {("a", "b"): UNDECIDED, ("b", "c"): certified(), ("a", "c"): Verdict(Status.REFUTED, because("no"))}
+    )
     with pytest.raises(Unreachable) as caught:
         g.plan("a", "c")
     assert caught.value.reachable == ("a",)

@@ -10,7 +10,7 @@ from modegraph.model.sets import Box
 from modegraph.model.target import Target
 from modegraph.plan.as_json import json_text
 from modegraph.report.tables import graph_data, print_checks, print_graph, print_run, run_data
-from tests.graph.fakes import UNDECIDED, certified, graph, mode
+from tests.graph.fakes import UNDECIDED, because, certified, graph, mode
 
 
 @pytest.fixture
@@ -19,10 +19,10 @@ def g() -> ModeGraph:
         ["a", mode("b", 2), Target("dock", Box([-0.1], [0.1]))],
         {
             ("a", "b"): certified(1.5, earliest=0.25),
-            ("a", "dock"): Verdict(Status.REFUTED, "stays [/red] at [0.5, 1]"),
+            ("a", "dock"): Verdict(Status.REFUTED, because("stays [/red] at [0.5, 1]")),
             ("b", "dock"): UNDECIDED,
         },
-        {"b": Verdict(Status.UNDECIDED, "no tail")},
+        {"b": Verdict(Status.UNDECIDED, because("no tail"))},
     )
 
 

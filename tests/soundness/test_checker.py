@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import modegraph as mg
+from tests.graph.fakes import because
 from tests.soundness.checker import Claim, examine, refutation_holds
 from tests.traps.question import flow
 
@@ -76,7 +77,7 @@ def test_an_energy_that_is_too_small():
 
 def refuted(x0: float, kind: str, time: float) -> mg.Verdict:
     witness = mg.Witness(np.array([x0]), None, {}, time, kind)  # type: ignore[arg-type]
-    return mg.Verdict(mg.Status.REFUTED, "by hand", witness=witness, horizon=2.0)
+    return mg.Verdict(mg.Status.REFUTED, because("by hand"), witness=witness, horizon=2.0)
 
 
 def test_a_right_refutation_passes():

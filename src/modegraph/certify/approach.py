@@ -12,6 +12,9 @@ from modegraph.certify.verdict import Approach, Floats
 from modegraph.model.sets import Ball, Ellipsoid, Sublevel
 from modegraph.reach.flow.framing import generator_box
 
+OWN_SIZE = "times its size"
+"""The unit of distances from an ellipsoid."""
+
 
 def approach_of(nearest: Nearest | None, region: Region, names: Sequence[str]) -> Approach | None:
     """What the nearest set of the worst part says of a target over the states ``names``; None where it is unbounded."""
@@ -60,7 +63,7 @@ def face_in_words(region: Region, face: int, names: Sequence[str]) -> tuple[str,
     if isinstance(target, Ball):
         return f"the ball of radius {target.radius:.6g} around {where}", "distance", float(target.radius)
     assert isinstance(target, Ellipsoid)
-    return f"the ellipsoid around {where}", "times its size", 1.0
+    return f"the ellipsoid around {where}", OWN_SIZE, 1.0
 
 
 def _sum(terms: Sequence[tuple[float, str]]) -> str:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from modegraph.certify.course import Course
-from modegraph.certify.findings import Findings, Waiting
+from modegraph.certify.findings import Findings, Waiting, ended
 from modegraph.certify.lasting import BehindFlows, NothingToKeep
 from modegraph.certify.legal import proved_instants, sampled_violation, unproved
 from modegraph.certify.proof import SafetyProof, SwitchProof
@@ -54,12 +54,11 @@ def findings_of(course: Course, wanted: Sequence[int], safety: bool, past: Past 
     """What a course shows of the goals; its first flow starts around the ends of the chains of the past."""
     flows, tail = course.flows, course.tail
     flow = flows[-1]
-    found = Findings(flow=flows[0], last=flow, tail_reason=course.reason)
+    found = Findings(flow=flows[0], last=flow, no_tail=course.no_tail)
     # The first flow that is not proved to its end, if there is one.
     short = next((f for f in flows if proved_instants(f) < len(f.steps)), flow)
     proved = proved_instants(short)
-    if flow.failure is not None:
-        found.failure = str(flow.failure)
+    found.failure = None if flow.failure is None else ended(flow.failure)
     if proved < len(short.steps):
         found.unproved = unproved(short, proved)
         found.broken = len(flows) == 1 and not past.chains and sampled_violation(flow)

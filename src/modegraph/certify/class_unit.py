@@ -16,9 +16,11 @@ from modegraph.certify.legal import (
     proved_until,
     sampled_violation,
     slack_until,
+    unproved,
     width_over_time,
 )
 from modegraph.certify.proof import SafetyProof, certified_check
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.base import least_slack
@@ -29,7 +31,7 @@ from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
 from modegraph.expression.scalar import Expr
 from modegraph.expression.simplify import simplify
-from modegraph.guarded import guarded, stopped
+from modegraph.guarded import guarded
 from modegraph.model.class_start import StartClass, returned_start
 from modegraph.model.mode import Mode
 from modegraph.model.sets.parametrised import ParametrisedSet
@@ -37,6 +39,7 @@ from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.ladder import CURVED
+from modegraph.reach.failure import Mechanism, engine_stopped
 from modegraph.reach.flow.flow import Order
 from modegraph.reach.flowpipe import DEFAULT_HORIZON, Cutting
 from modegraph.reach.start.piece import Chart, Piece
@@ -52,9 +55,9 @@ PROGRESS = 1.05
 
 @dataclass(frozen=True)
 class ClassResult:
-    """Relations parallel to the targets (a text where there can be none), and the check of the whole class."""
+    """Relations parallel to the targets (a reason where there can be none), and the check of the whole class."""
 
-    relations: list[Relation | str]
+    relations: list[Relation | Reason]
     check: Verdict
 
 
@@ -87,16 +90,16 @@ def relate(
     known = iter(links.relations)
     # Of the constraints until the last instant that any of the relations uses.
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
-    relations = [goal if isinstance(goal, str) else replace(next(known), slack=slack) for goal in goals]
+    relations = [goal if isinstance(goal, Reason) else replace(next(known), slack=slack) for goal in goals]
     return ClassResult(relations, _check(compiled, links.chains))
 
 
-def _goal(spec: TargetSpec, plant: int) -> TargetClass | str:
+def _goal(spec: TargetSpec, plant: int) -> TargetClass | Reason:
     """A target of the relations, or why it cannot be one."""
     try:
         return target_class(spec.mode, spec.p, plant)
     except ModegraphError as error:
-        return str(error)
+        return Reason(Outcome.UNUSABLE_TARGET, text=str(error))
 
 
 def _legal_chains(
@@ -175,16 +178,23 @@ def _check(compiled: CompiledMode, chains: Sequence[Chain]) -> Verdict:
         ends = [chain.flows[-1] for chain in chains]
         return replace(certified_check(SafetyProof(tuple(NothingToKeep(flow) for flow in ends))), widths=widths)
     if until < 0.0:
-        reason = "the constraints are not proved at the start for all references of the class"
-        return Verdict(Status.UNDECIDED, reason, until=0.0, widths=widths)
+        reason = Reason(Outcome.START_NOT_PROVED, whole_class=True)
+        return Verdict(Status.UNDECIDED, (reason, *_in_the_way(chains)), until=0.0, widths=widths)
     tails = _tails(compiled, chains)
     if isinstance(tails, TailFailure):
-        reason = (
-            f"constraints proved until t = {until:.4g} s for all references of the class, not for ever: {tails.reason}"
-        )
-        return Verdict(Status.UNDECIDED, reason, until=until, widths=widths)
+        reason = Reason(Outcome.NOT_FOR_EVER, until=until, why=tails, whole_class=True)
+        return Verdict(Status.UNDECIDED, (reason, *_in_the_way(chains)), until=until, widths=widths)
     evidence = tuple(BehindFlows(chain.flows, tail) for chain, tail in zip(chains, tails, strict=True))
     return replace(certified_check(SafetyProof(evidence)), widths=widths)
+
+
+def _in_the_way(chains: Sequence[Chain]) -> list[Reason]:
+    """What ended the chain that ends first: a constraint, or the flow itself; nothing where all go to their end."""
+    worst = min(chains, key=proved_until)
+    broken = next((flow for flow in worst.flows if proved_instants(flow) < len(flow.steps)), None)
+    breach = None if broken is None else unproved(broken, proved_instants(broken))
+    why = [] if breach is None else [breach.reason]
+    return why + ([] if worst.failure is None else [Reason(Outcome.FLOWPIPE_ENDED, failure=worst.failure)])
 
 
 def _tails(compiled: CompiledMode, chains: Sequence[Chain]) -> list[Tail] | TailFailure:
@@ -193,7 +203,7 @@ def _tails(compiled: CompiledMode, chains: Sequence[Chain]) -> list[Tail] | Tail
     for chain in chains:
         flow = chain.flows[-1]
         if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
-            return TailFailure("the flowpipe ends before the loop has settled")
+            return TailFailure(Mechanism.ENDS_BEFORE_SETTLED)
         order = Order(1, 0) if compiled.linear else _tail_order(chain)
         search = TailSearch(
             flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
@@ -202,13 +212,14 @@ def _tails(compiled: CompiledMode, chains: Sequence[Chain]) -> list[Tail] | Tail
         if isinstance(tail, TailFailure):
             return tail
         if not (tail.face_upper <= 0.0).all():
-            return TailFailure("a constraint cannot be proved on the invariant set")
+            return TailFailure(Mechanism.CONSTRAINT_IN_TAIL)
         found.append(tail)
     return found
 
 
 def _no_tail(error: Exception) -> Tail | TailFailure:
-    return TailFailure(stopped(error))
+    mechanism, fields = engine_stopped(error)
+    return TailFailure(mechanism, **fields)
 
 
 def _tail_order(chain: Chain) -> Order:

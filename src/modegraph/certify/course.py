@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from modegraph.certify.findings import NoTail
 from modegraph.certify.legal import proved_instants, set_size
 from modegraph.certify.question import Question
 from modegraph.certify.switching.funnel import Arrival, Funnels, Sinking
-from modegraph.guarded import guarded, stopped
+from modegraph.guarded import guarded
 from modegraph.reach.cover.restart import WIDE_GAP, filled_share, restarted
+from modegraph.reach.failure import Failure, Mechanism, engine_stopped
 from modegraph.reach.flow.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow
 from modegraph.reach.parallelotope import mode_gap
 from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
@@ -41,7 +43,7 @@ class Course:
     ----------
     flows : the chain, extended in place
     tail : Tail, Sinking or None
-        What closes the time axis, or else the ``reason`` there is nothing.
+        What closes the time axis, or else why there is nothing: ``no_tail``.
     parked : bool
         The last flow wants to be restarted; ``following`` is the flow that may go on alone, if there is one.
     nearest : goal to (gauge, seconds)
@@ -53,7 +55,7 @@ class Course:
     park: bool
     common: bool
     tail: Tail | Sinking | None = None
-    reason: str = ""
+    no_tail: NoTail = ()
     parked: bool = False
     following: Flow | None = None
     nearest: dict[int, tuple[float, float]] = field(default_factory=dict)
@@ -159,18 +161,19 @@ class Course:
                 flow.fields[-1], flow.piece.chart, compiled.w_centre, compiled.w_radius, compiled.loop.names,
                 question.tail_order,
             ).attempt([flow]),
-            lambda error: TailFailure(stopped(error)),
+            _no_tail,
         )  # fmt: skip
         if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
             self.tail, self._decay = outcome, outcome.decay
             return
-        self.reason = getattr(outcome, "reason", "a constraint fails in the invariant set")
+        missed = Failure(Mechanism.CONSTRAINT_IN_TAIL) if isinstance(outcome, Tail) else outcome
+        self.no_tail = (missed,)
         sunk = self._sink(flow, pending) if not pending else None
         if isinstance(sunk, Sinking):
             self.tail, self._decay = sunk, sunk.tail().decay
-        elif sunk is not None and sunk.reason.partition(":")[0] not in self.reason:
+        elif sunk is not None and sunk.mechanism is not missed.mechanism:
             # Not the same again with other numbers.
-            self.reason = f"{self.reason}; no funnel either: {sunk.reason}"
+            self.no_tail = (missed, sunk)
 
     def _rest(self, flow: Flow, settling: bool) -> float:
         """From when an invariant set is looked for, seconds: ``settling``, not before the slowest mode has had time."""
@@ -200,7 +203,7 @@ class Course:
                 self._funnels = Funnels(loop, question.deadline)
             return self._funnels.enter(flow, [goal.region for goal in goals if goal.reset is None])
 
-        return guarded("the search for a funnel", work, lambda error: NoFunnel(stopped(error)))
+        return guarded("the search for a funnel", work, _no_funnel)
 
     def _arrives(self, sinking: Sinking, j: int) -> bool:
         goal = self.question.goals[j]
@@ -218,6 +221,16 @@ class Course:
             lambda: float(goal.region.gauges(flow.bounds, p[None, :n], [G[:, :n]])[0]),
             lambda error: np.inf,
         )
+
+
+def _no_tail(error: Exception) -> Tail | TailFailure:
+    mechanism, fields = engine_stopped(error)
+    return TailFailure(mechanism, **fields)
+
+
+def _no_funnel(error: Exception) -> Sinking | NoFunnel | None:
+    mechanism, fields = engine_stopped(error)
+    return NoFunnel(mechanism, **fields)
 
 
 def again(question: Question, last: Sequence[Flow], first: bool, common: bool) -> Flow | None:

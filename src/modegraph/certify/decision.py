@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from modegraph.certify.chain_evidence import Past
 from modegraph.certify.course import again
 from modegraph.certify.exploration import Exploration
-from modegraph.certify.findings import Findings, Waiting, settle
+from modegraph.certify.findings import Findings, Waiting, ended, settle
 from modegraph.certify.proof import safe_together, together
 from modegraph.certify.question import Question
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.start.piece import Piece
 
 
@@ -84,7 +85,8 @@ class _Continuation:
         ends = [chain.flows[-1] for chain in waits]
         following = waits[0].following if len(ends) == 1 else again(question, ends, False, self.exploration.common)
         if following is None:
-            part = Findings(flow=ends[0], last=ends[-1], failure="the reach set cannot be enclosed again")
+            failure = Failure(Mechanism.NOT_ENCLOSED_AGAIN, time=max(flow.time for flow in ends))
+            part = Findings(flow=ends[0], last=ends[-1], failure=ended(failure))
         else:
             past = Past([chain.flows for chain in waits])
             part = self.exploration.follow([following], past, found, park=False)
@@ -108,4 +110,4 @@ def _finish(found: Findings, parts: Sequence[Findings]) -> None:
         found.safety = safe_together([*found.waiting_safety, *(part.safety for part in parts)])
     for part in parts:
         found.failure, found.unproved = part.failure, part.unproved
-        found.tail_reason, found.safe_until = part.tail_reason, max(found.safe_until, part.safe_until)
+        found.no_tail, found.safe_until = part.no_tail, max(found.safe_until, part.safe_until)

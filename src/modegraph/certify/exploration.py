@@ -12,10 +12,11 @@ from modegraph.certify.chain_evidence import NOTHING, Past, findings_of
 from modegraph.certify.course import TOO_MUCH_FEEDBACK, Course
 from modegraph.certify.findings import Findings, better, filled, merge
 from modegraph.certify.question import Question
+from modegraph.certify.reason import engine_reason
 from modegraph.certify.switching.common_time import Missed, widest_variable
 from modegraph.cores import in_parallel
 from modegraph.enclosure.monomials import monomial_count
-from modegraph.guarded import guarded, stopped
+from modegraph.guarded import guarded
 from modegraph.reach.cover.cuts import nonlinear_variable, parts_of_refused
 from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.start.piece import Piece
@@ -115,7 +116,7 @@ class Exploration:
         part = self.follow([chain.following], Past([chain.flows]), found, park=True)
         assert part.last is not None
         if part.failure or part.unproved or part.last.feedback > TOO_MUCH_FEEDBACK:
-            found.unpark(part.failure or str(part.unproved or "") or filled(part.last))
+            found.unpark(part.failure or part.unproved or filled(part.last))
             return
         chain.alone = part
 
@@ -138,7 +139,7 @@ class Exploration:
             return found
         if self.common and flow.feedback > TOO_MUCH_FEEDBACK:
             found.refused = found.held_back = True
-            found.unpark(filled(flow))
+            found.waits, found.failure = [], filled(flow)
             return found
         found.waiting = {j: [] for j in wanted if j not in found.proofs}
         if safety and found.safety is None:
@@ -149,4 +150,4 @@ class Exploration:
 def _lost(piece: Piece, wanted: Sequence[int], error: Exception) -> Findings:
     """Nothing is known of a part."""
     missed = {j: Missed(np.inf, 0.0, False, piece.middle) for j in wanted}
-    return Findings(missed=missed, failure=stopped(error))
+    return Findings(missed=missed, failure=engine_reason(error))

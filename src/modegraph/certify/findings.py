@@ -6,9 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from modegraph.certify.proof import SafetyProof, SwitchProof, safe_together, together
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.verdict import Unproved
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import Flow
+
+NoTail = tuple[Failure, ...]
+"""Why there is no invariant set, and why no funnel; empty where none was looked for."""
 
 
 @dataclass
@@ -28,8 +33,8 @@ class Findings:
     missed: dict[int, Missed] = field(default_factory=dict)
     safety: SafetyProof | None = None
     safe_until: float = 0.0
-    tail_reason: str = ""
-    failure: str = ""
+    no_tail: NoTail = ()
+    failure: Reason | None = None
     unproved: Unproved | None = None
     broken: bool = False
     """A sampled start really breaks a constraint: smaller parts cannot help."""
@@ -47,20 +52,20 @@ class Findings:
     """Goals that depend on the parts that wait, with the proofs of the other parts."""
     waiting_safety: list[SafetyProof] | None = None
 
-    def unpark(self, why: str) -> None:
+    def unpark(self, why: Reason | Unproved) -> None:
         """Nothing waits any more: the part is too large, for this reason."""
         self.waits, self.waiting, self.waiting_safety = [], {}, None
-        self.failure = too_wide(why)
+        self.failure = Reason(Outcome.TOO_LARGE, why=why.reason if isinstance(why, Unproved) else why)
 
 
-def filled(flow: Flow) -> str:
+def ended(failure: Failure) -> Reason:
+    """That a flowpipe ends, and why."""
+    return Reason(Outcome.FLOWPIPE_ENDED, failure=failure)
+
+
+def filled(flow: Flow) -> Reason:
     """Why a flow cannot go on whose remainder feeds itself."""
-    return f"at t = {flow.time:.6g} s the disturbance has filled the reach set"
-
-
-def too_wide(why: str) -> str:
-    """What would help a part that is too large."""
-    return f"{why}; a smaller start set or disturbance would help"
+    return ended(Failure(Mechanism.FILLED, time=flow.time))
 
 
 def better(part: Findings, whole: Findings, wanted: Sequence[int], safety: bool) -> bool:
@@ -108,8 +113,9 @@ def merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], saf
         found.safety = safe_together([part.safety for part in parts])
         if found.safety is None:
             found.safe_until = max(found.safe_until, min(part.safe_until for part in parts))
+            found.no_tail = next((part.no_tail for part in parts if part.safety is None), ()) or found.no_tail
     if all(not part.failure for part in parts):
-        found.failure = ""
+        found.failure = None
     if all(not part.unproved for part in parts):
         found.unproved = None
     return found

@@ -77,14 +77,18 @@ def proved_until(chain: Chain) -> float:
 
 
 def unproved(flow: Flow, proved: int) -> Unproved | None:
-    """The constraint that is not proved on the step after instant ``proved`` (-1: at the start)."""
+    """The constraint that is not proved on the step after instant ``proved`` (-1: at the start), or with the inputs
+    behind a breakpoint at its end; None where all are, and only the flow does not go on."""
     if proved < 0:
         upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
         names, when = flow.fields[flow.first_segment].faces, float(flow.times[0])
     else:
         step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
         upper, names, when = step.face_upper, flow.fields[step.segment].faces, step.start
-    if not len(upper):
+        if (upper <= 0.0).all() and step.segment + 1 < len(flow.fields):
+            upper = flow.faces_at(step.end, step.p, step.G, step.segment + 1)
+            names, when = flow.fields[step.segment + 1].faces, step.end
+    if (upper <= 0.0).all():
         return None
     k = int(np.argmax(np.where(np.isnan(upper), np.inf, upper)))
     return Unproved(names[k], when, float(upper[k]))

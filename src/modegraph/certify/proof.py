@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from modegraph.certify.lasting import LastingEvidence
+from modegraph.certify.reason import Outcome, Reason, point
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.base import Evidence, Nearest, least_slack
 from modegraph.certify.switching.families import OfEveryPair, OfPair
@@ -117,13 +118,13 @@ def safe_together(proofs: Sequence[SafetyProof | None]) -> SafetyProof | None:
 def certified_switch(proof: SwitchProof, horizon: float | None, closest: Approach | None = None) -> Verdict:
     """The verdict of a complete proof of condition (C)."""
     if proof.latest == 0.0:
-        reason = "every start is already in the target: a switch in zero time"
+        reason = Reason(Outcome.ZERO_TIME)
     else:
-        pieces = "" if proof.parts == 1 else f", in {proof.parts} pieces with a time each"
-        reason = f"every start is in the target by {proof.latest:.4g} s{pieces}; constraints proved until then"
+        outcome = Outcome.FUNNEL if any(e.sinks for e in proof.evidence) else Outcome.COMMON_TIME
+        reason = Reason(outcome, latest=proof.latest, parts=proof.parts)
     return Verdict(
         Status.CERTIFIED,
-        reason,
+        (reason,),
         time=(proof.earliest, proof.latest),
         margin=proof.margin,
         slack=dict(proof.slack),
@@ -139,20 +140,19 @@ def certified_pair(relation: Relation, source: Floats, target: Floats, horizon: 
     return certified_switch(SwitchProof((OfPair(relation, source, target),)), horizon)
 
 
-def certified_for_some(relation: Relation, source: Floats, target: Floats, told: str, horizon: float | None) -> Verdict:
+def certified_for_some(relation: Relation, source: Floats, target: Floats, horizon: float | None) -> Verdict:
     """The existential verdict on two classes; its numbers hold for every certified pair, its margin is of this one."""
     verdict = certified_switch(SwitchProof((OfEveryPair(relation, source, target),)), horizon)
-    reason = f"certified for a continuous set of references, among them {told}"
-    return replace(verdict, reason=reason, margin=OfPair(relation, source, target).margin)
+    reason = Reason(Outcome.SOME_REGION_CERTIFIED, r_i=point(source[0]), r_j=point(target[0]))
+    return replace(verdict, why=(reason,), margin=OfPair(relation, source, target).margin)
 
 
 def certified_check(proof: SafetyProof) -> Verdict:
     """The verdict of a complete proof of Assumption 1."""
-    text = "constraints proved for all t >= 0" if proof.slack else "no constraints; the flow exists for all t >= 0"
     tracking = proof.tracking if proof.tracking.size and np.isfinite(proof.tracking).all() else None
     return Verdict(
         Status.CERTIFIED,
-        f"{text} (invariant set from t = {proof.tail_start:.4g} s on)",
+        (Reason(Outcome.FOR_ALL_TIME, start=proof.tail_start, constraints=bool(proof.slack)),),
         slack=dict(proof.slack),
         tracking=tracking,
     )
@@ -160,7 +160,4 @@ def certified_check(proof: SafetyProof) -> Verdict:
 
 def only_entered(name: str) -> Verdict:
     """What stands for Assumption 1 at a `Target`: it is entered and never left, so nothing is asked of it."""
-    return Verdict(
-        Status.CERTIFIED,
-        f"target {name!r} is only entered: the constraints are proved up to the entry, nothing after it",
-    )
+    return Verdict(Status.CERTIFIED, (Reason(Outcome.ONLY_ENTERED, target=name),))

@@ -176,4 +176,5 @@ def part_of(chain: Chain, goal: TargetClass, end: float, classes: Sequence[tuple
     """What the flows of a chain prove of a target; None where they have no usable instant."""
     moments = (moments_of(flow, goal, end, classes) for flow, _ in proved(chain))
     found = [m for m in moments if m is not None]
-    return Part(tuple(found)) if found else None
+    axes = chain.piece.chart.axes
+    return Part(tuple(found), axes @ chain.piece.middle[: axes.shape[1]]) if found else None

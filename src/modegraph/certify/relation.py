@@ -28,6 +28,8 @@ class Part:
     """One part of the starts of the source: the flows that carry it on, each with its instants."""
 
     flows: tuple[Moments, ...]
+    offset: Floats | None = None
+    """(n,): from the centre of the start set to the middle of this part (floats, for messages)."""
 
     def meets(self, lo: Floats, hi: Floats) -> NDArray[np.bool_]:
         """For boxes (B, ki) of references: whether this part may have starts for some of them."""
@@ -137,6 +139,17 @@ class Relation:
         known = np.where(instant == -2, len(table) - 1, instant)
         worst = np.where(found[:, None], table[known].max(axis=1), np.inf)
         return Crossings(gauge, worst[:, 0], worst[:, 1])
+
+    def worst(self, source: Floats, target: Floats) -> tuple[int, float]:
+        """For one pair (1, ki), (1, kj) with a finite gauge: the part that decides it, and its best instant (s)."""
+        there = self.goal.at(target)
+        found: list[tuple[float, int, float]] = []
+        for k, part in enumerate(self.parts):
+            if part.meets(source, source)[0]:
+                gauges = part_gauges(k, source, *there, *self._table)[0]
+                best = int(np.argmin(gauges))
+                found.append((float(gauges[best]), k, float(np.concatenate([f.times for f in part.flows])[best])))
+        return max(found)[1:]
 
     def certified(self, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """Which pairs are certified, as fast as can be."""

@@ -26,6 +26,7 @@ from modegraph.certify.findings import Findings
 from modegraph.certify.legal import width_over_time
 from modegraph.certify.proof import SwitchProof, certified_check, certified_switch
 from modegraph.certify.question import Goal, Question
+from modegraph.certify.reason import Outcome, Reason, point
 from modegraph.certify.switching.zero_time import InZeroTime
 from modegraph.certify.targets.region import Region
 from modegraph.certify.targets.sublevel import target_region
@@ -38,6 +39,7 @@ from modegraph.model.mode import Mode
 from modegraph.model.sets import is_subset
 from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode, compile_mode, compile_reset
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import Order
 from modegraph.reach.tail.box import Tail, TailSearch
 
@@ -128,14 +130,16 @@ class _Unit:
             try:
                 self.goals[k] = goal_of(spec, self.compiled.plant)
             except ModegraphError as error:
-                self.verdicts[k] = Verdict(Status.UNDECIDED, str(error), horizon=self.horizon)
+                reason = Reason(Outcome.UNUSABLE_TARGET, text=str(error))
+                self.verdicts[k] = Verdict(Status.UNDECIDED, (reason,), horizon=self.horizon)
         try:
             self._prove()
         except ModegraphError as error:
             # A limit of the engine, not of the model: that was checked when the mode was compiled.
-            self.check = self.check or Verdict(Status.UNDECIDED, str(error))
+            why = (Reason(Outcome.ENGINE_LIMIT, text=str(error)),)
+            self.check = self.check or Verdict(Status.UNDECIDED, why)
             for k in range(len(self.targets)):
-                self.verdicts.setdefault(k, Verdict(Status.UNDECIDED, str(error), horizon=self.horizon))
+                self.verdicts.setdefault(k, Verdict(Status.UNDECIDED, why, horizon=self.horizon))
         assert self.check is not None
         return UnitResult([self.verdicts[k] for k in range(len(self.targets))], self.check)
 
@@ -252,11 +256,8 @@ class _Unit:
                 w = equilibrium.w if len(equilibrium.w) else None
                 names = dict(zip(scene.unknowns, equilibrium.d.tolist(), strict=True))
                 witness = Witness(x0, w, names, 0.0, "trapped", self.p, self.targets[k].p)
-                reason = (
-                    f"the equilibrium near {_short(x0)}{_under(w)} is a start of '{self.mode.name}' and lies outside "
-                    f"the target: that trajectory never reaches it"
-                )
-                self.verdicts[k] = Verdict(Status.REFUTED, reason, witness=witness, horizon=None)
+                reason = Reason(Outcome.TRAPPED_AT_EQUILIBRIUM, x0=point(x0), w=point(w), mode=self.mode.name)
+                self.verdicts[k] = Verdict(Status.REFUTED, (reason,), witness=witness, horizon=None)
                 left.remove(k)
         return left
 
@@ -292,12 +293,11 @@ class _Unit:
         return self._judge(run, tail, left)
 
     def _judge(self, run: PointRun, tail: Tail | None, left: list[int]) -> list[int]:
-        x0 = _short(run.x0)
-        under = _under(run.w if len(run.w) else None)
+        who = {"x0": point(run.x0), "w": point(run.w) if len(run.w) else None}
         if self.check is None and run.violation is not None:
             witness = run.witness("violates", run.violation, self.p, None)
-            reason = f"the start {x0}{under} violates the constraints at t = {run.violation:.4g} s"
-            self.check = Verdict(Status.REFUTED, reason, witness=witness)
+            reason = Reason(Outcome.VIOLATES, **who, time=run.violation, before_entry=False)
+            self.check = Verdict(Status.REFUTED, (reason,), witness=witness)
         for k in list(left):
             region = self.goals[k].region
             apart = run.apart_until(region)
@@ -305,24 +305,16 @@ class _Unit:
             verdict: Verdict | None = None
             if run.violation is not None and (run.violation == 0.0 or apart >= run.violation):
                 witness = run.witness("violates", run.violation, self.p, at)
-                reason = (
-                    f"the start {x0}{under} violates the constraints at t = {run.violation:.4g} s, "
-                    "before it has entered the target"
-                )
-                verdict = Verdict(Status.REFUTED, reason, witness=witness)
+                reason = Reason(Outcome.VIOLATES, **who, time=run.violation, before_entry=True)
+                verdict = Verdict(Status.REFUTED, (reason,), witness=witness)
             elif tail is not None and apart >= run.flow.time and self._outside(region, tail):
                 witness = run.witness("trapped", tail.start, self.p, at)
-                reason = (
-                    f"the start {x0}{under} never reaches the target: it is trapped outside from t = {tail.start:.4g} s"
-                )
-                verdict = Verdict(Status.REFUTED, reason, witness=witness)
+                reason = Reason(Outcome.TRAPPED, **who, time=tail.start)
+                verdict = Verdict(Status.REFUTED, (reason,), witness=witness)
             elif self.horizon is not None and run.violation is None and apart >= self.horizon:
                 witness = run.witness("horizon", self.horizon, self.p, at)
-                reason = (
-                    f"the start {x0}{under} stays outside the target up to the horizon of "
-                    f"{self.horizon:g} s (this horizon only)"
-                )
-                verdict = Verdict(Status.REFUTED, reason, witness=witness, horizon=self.horizon)
+                reason = Reason(Outcome.HORIZON, **who, horizon=self.horizon)
+                verdict = Verdict(Status.REFUTED, (reason,), witness=witness, horizon=self.horizon)
             if verdict is not None:
                 self.verdicts[k] = verdict
                 left.remove(k)
@@ -340,25 +332,22 @@ class _Unit:
 
     def _undecided(self, found: Findings, k: int) -> Verdict:
         missed = found.missed.get(k)
-        parts = []
+        why: list[Reason] = []
         margin = None
         if missed is not None and np.isfinite(missed.gauge):
             margin = 1.0 - missed.gauge
-            parts.append(
-                f"no common time was found: at best (t = {missed.time:.4g} s) the worst part of the starts "
-                f"reaches {missed.gauge:.3g} times the size of the target (1 is needed)"
-            )
-        if found.unproved:
-            parts.append(str(found.unproved))
-        if found.failure:
-            parts.append("the flowpipe ends " + found.failure)
-        if self.deadline.met:
-            parts.append("the budget ended; try a larger budget=")
-        elif missed is not None and not parts:
-            parts.append("the constraints are not proved at t = 0")
-        if missed is not None and missed.gauge < 1.5 and not found.failure:
-            parts.append("a smaller start set or a slightly larger target would help")
-        return Verdict(Status.UNDECIDED, "; ".join(parts), margin=margin, horizon=self.horizon)
+            why.append(Reason(Outcome.NO_COMMON_TIME, gauge=missed.gauge, time=missed.time))
+        why += self._in_the_way(found)
+        if not why:
+            missed_at_start = missed is not None and found.safe_until == 0.0
+            why.append(Reason(Outcome.START_NOT_PROVED if missed_at_start else Outcome.NOTHING_FOUND))
+        return Verdict(Status.UNDECIDED, tuple(why), margin=margin, horizon=self.horizon)
+
+    def _in_the_way(self, found: Findings) -> list[Reason]:
+        """What ended the proofs of all goals and of the check."""
+        why = [] if found.unproved is None else [found.unproved.reason]
+        why += [] if found.failure is None else [found.failure]
+        return why + ([Reason(Outcome.BUDGET_ENDED)] if self.deadline.met else [])
 
     def _missed(self, found: Findings, k: int) -> Approach | None:
         """How near the starts come to target k, and the worst of them."""
@@ -374,21 +363,13 @@ class _Unit:
         return closest if start is None else replace(closest, start=start, origin=origin)
 
     def _unchecked(self, found: Findings) -> Verdict:
-        parts = [str(found.unproved)] if found.unproved else []
-        parts += ["the flowpipe ends " + found.failure] if found.failure else []
-        if not parts:
-            tail = found.tail_reason or "no invariant set was tried"
-            parts = [f"constraints proved until t = {found.safe_until:.4g} s, but not for all time: {tail}"]
-        return Verdict(Status.UNDECIDED, "; ".join(parts), until=found.safe_until)
+        why = self._in_the_way(found)
+        if found.no_tail or not why:
+            missing = found.no_tail or (Failure(Mechanism.NOT_FOLLOWED),)
+            funnel = missing[1] if len(missing) > 1 else None
+            why.insert(0, Reason(Outcome.NOT_FOR_EVER, until=found.safe_until, why=missing[0], funnel=funnel))
+        return Verdict(Status.UNDECIDED, tuple(why), until=found.safe_until)
 
 
 def _nothing(error: Exception) -> None:
     """What was decided before the engine stopped stays decided."""
-
-
-def _short(x: Floats) -> str:
-    return "(" + ", ".join(f"{v:.4g}" for v in x) + ")"
-
-
-def _under(w: Floats | None) -> str:
-    return "" if w is None else f" under the constant disturbance {_short(w)}"

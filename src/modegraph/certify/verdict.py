@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -10,6 +9,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from modegraph.certify.reason import Outcome, Reason, Why
+from modegraph.reach.statement import texts, told
 
 Floats = NDArray[np.float64]
 
@@ -114,10 +116,13 @@ class Unproved:
     time: float
     by: float
 
+    @property
+    def reason(self) -> Reason:
+        """It as a reason of a verdict."""
+        return Reason(Outcome.CONSTRAINT_NOT_PROVED, constraint=self.constraint, time=self.time, by=self.by)
+
     def __str__(self) -> str:
-        when = f"at t = {self.time:.4g}" if self.time == 0.0 else f"after t = {self.time:.4g} s"
-        by = f"exceeded by up to {self.by:.3g}" if math.isfinite(self.by) else "not defined on the whole set"
-        return f"constraint '{self.constraint}' cannot be proved {when} ({by})"
+        return str(self.reason)
 
 
 @dataclass(frozen=True)
@@ -127,8 +132,10 @@ class Verdict:
     Attributes
     ----------
     status : Status
+    why : tuple of Reason
+        What was proved, or what stood in the way: an `Outcome` each, with numbers and a remedy.
     reason : str
-        For a person: what was proved, or what stood in the way and what would help.
+        The same for a person; with what would help where it is undecided. Programs read ``why``.
     time : (float, float) or None
         Certified only: seconds ``(earliest, latest)`` after entering the source mode. No trajectory
         is in the target before ``earliest``; every one has been by ``latest``.
@@ -159,7 +166,7 @@ class Verdict:
     """
 
     status: Status
-    reason: str
+    why: Why
     time: tuple[float, float] | None = None
     margin: float | None = None
     slack: Mapping[str, float] = field(default_factory=dict)
@@ -172,3 +179,8 @@ class Verdict:
     widths: Widths | None = None
     closest: Approach | None = None
     unproved: Unproved | None = None
+
+    @property
+    def reason(self) -> str:
+        """`why` as prose."""
+        return told(self.why) if self.status is Status.UNDECIDED else texts(self.why)

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from modegraph.certify.approach import OWN_SIZE
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Widths
 from modegraph.explain.repairs import Repair
@@ -132,7 +133,7 @@ def _approach_lines(e: Explanation) -> list[str]:
         lines.append(f"  {what}, of all that the worst part of the starts can reach: {at}")
     if e.block is not None:
         b = e.block
-        unit = f" {b.unit}" if b.unit.startswith("times") else f" ({b.unit})" if b.unit else ""
+        unit = f" {b.unit}" if b.unit == OWN_SIZE else f" ({b.unit})" if b.unit else ""
         if certified:
             lines.append(f"  nearest face: {b.name}, {-b.missing:.4g}{unit} of room")
         else:

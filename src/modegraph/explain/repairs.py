@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.verdict import Approach, Status, Verdict
 from modegraph.errors import ModegraphError
 from modegraph.explain.pair import Pair
@@ -189,7 +190,7 @@ class RepairSearch:
         verdict = self._proved(change(least), 0.4)
         if verdict.status is not Status.CERTIFIED:
             starts = f"{least:g} times the starts of {name!r}"
-            why = f"not even {starts} would do: {verdict.reason.partition('; ')[0]}"
+            why = f"not even {starts} would do: {verdict.why[0]}"
             self._missing("shrink start", f"{starts} were not decided in time" if self._cut else why)
             return
         # A switch in zero time says nothing of how near larger starts come.
@@ -294,9 +295,10 @@ def attempt(prove: Callable[[], Verdict]) -> Verdict:
     try:
         return prove()
     except ModegraphError as error:
-        return Verdict(Status.UNDECIDED, str(error))
+        return Verdict(Status.UNDECIDED, (Reason(Outcome.ENGINE_LIMIT, text=str(error)),))
     except Exception as error:
-        return Verdict(Status.UNDECIDED, f"the proof engine stopped with {type(error).__name__}: {error}")
+        reason = Reason(Outcome.ENGINE_STOPPED, error=type(error).__name__, text=str(error))
+        return Verdict(Status.UNDECIDED, (reason,))
 
 
 def rounded(value: float, up: bool) -> float:

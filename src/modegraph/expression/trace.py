@@ -39,7 +39,9 @@ _REMEDIES = (
     ("not iterable", "a single traced number has no entries"),
     ("could not be broadcast", "check the lengths of the arrays"),
     ("out of bounds", "the index exceeds the number of states, inputs or entries"),
+    ("read-only", "arguments must not be changed in place, begin with x = x.copy()"),
 )
+"""What to do about messages of Python and NumPy, which have no other mark."""
 
 
 def _signature(fn: Function, where: str) -> inspect.Signature:

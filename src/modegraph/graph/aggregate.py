@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from modegraph.certify.references import Parameter, parameter_text
+from modegraph.certify.reason import Outcome, Reason, point
+from modegraph.certify.references import Parameter
 from modegraph.certify.verdict import Status, Verdict, Witness
 
 Case = tuple[Parameter, Parameter, Verdict]
@@ -30,7 +32,7 @@ def some_pair(cases: Sequence[Case]) -> Verdict:
         times = [v.time for v in verdicts if v.time is not None]
         return replace(
             verdicts[0],
-            reason=f"certified for {len(certified)} of {count} pairs of references, {_told(certified[0])}",
+            why=(Reason(Outcome.SOME_PAIRS_CERTIFIED, certified=len(certified), count=count, **_told(certified[0])),),
             time=(min(t[0] for t in times), max(t[1] for t in times)) if times else None,
             margin=_smallest(v.margin for v in verdicts),
             slack=_least_slack(verdicts),
@@ -43,16 +45,14 @@ def some_pair(cases: Sequence[Case]) -> Verdict:
     closest = deciding_pair(rest)
     horizons = [v.horizon for _, _, v in rest if v.horizon is not None]
     if undecided:
-        share = "all" if len(undecided) == count else f"{len(undecided)} of"
-        others = "" if len(undecided) == count else ", refuted for the others"
-        reason = f"undecided for {share} {count} pairs of references{others}; closest {_told(closest)}"
+        reason = Reason(Outcome.SOME_PAIRS_UNDECIDED, undecided=len(undecided), count=count, **_told(closest))
         status = Status.UNDECIDED
     else:
-        reason = f"refuted for all {count} pairs of references; closest {_told(closest)}"
+        reason = Reason(Outcome.ALL_PAIRS_REFUTED, count=count, **_told(closest))
         status = Status.REFUTED
     return Verdict(
         status=status,
-        reason=reason,
+        why=(reason,),
         margin=closest[2].margin,
         witness=closest[2].witness,
         horizon=min(horizons) if horizons else None,
@@ -81,30 +81,32 @@ def every_member(cases: Sequence[tuple[Parameter, Verdict]]) -> Verdict:
     verdicts = [v for _, v in cases]
     if failing:
         p, worst = failing[0]
-        reason = f"refuted for {len(failing)} of {count} references, e.g. {parameter_text(p)}: {worst.reason}"
-        return replace(worst, reason=reason, witness=_named(worst.witness, p, None))
+        example = {"count": count, "r": point(p), "why": worst.why}
+        why = (Reason(Outcome.SOME_REFERENCES_REFUTED, failing=len(failing), **example),)
+        return replace(worst, why=why, witness=_named(worst.witness, p, None))
     if open_:
         p, worst = open_[0]
-        reason = f"undecided for {len(open_)} of {count} references, e.g. {parameter_text(p)}: {worst.reason}"
+        example = {"count": count, "r": point(p), "why": worst.why}
         return replace(
             worst,
-            reason=reason,
+            why=(Reason(Outcome.SOME_REFERENCES_UNDECIDED, undecided=len(open_), **example),),
             until=_smallest(v.until for _, v in open_),
             slack=_least_slack(verdicts),
             tracking=_widest(verdicts),
         )
     return replace(
         verdicts[0],
-        reason=f"certified for all {count} references",
+        why=(Reason(Outcome.ALL_REFERENCES_CERTIFIED, count=count),),
         margin=_smallest(v.margin for v in verdicts),
         slack=_least_slack(verdicts),
         tracking=_widest(verdicts),
     )
 
 
-def _told(case: Case) -> str:
+def _told(case: Case) -> dict[str, Any]:
+    """The fields of a reason that speaks of one pair."""
     r_i, r_j, verdict = case
-    return f"from reference {parameter_text(r_i)} to {parameter_text(r_j)}: {verdict.reason}"
+    return {"r_i": point(r_i), "r_j": point(r_j), "why": verdict.why}
 
 
 def _with_references(verdict: Verdict, r_i: Parameter, r_j: Parameter) -> Verdict:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from modegraph.certify.class_unit import relate
+from modegraph.certify.reason import Outcome, Reason, engine_reason
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec, UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
@@ -22,7 +23,7 @@ from modegraph.errors import ModegraphError, NotBuiltYet
 from modegraph.graph.classes import Classes, Link
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.graph.progress import Progress, reporting
-from modegraph.guarded import note, stopped
+from modegraph.guarded import note
 from modegraph.model.closed_loop import close_loop, mode_start
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
@@ -117,13 +118,13 @@ class _Unit:
     """Nodes to which there is a relation: one of both is a continuous class."""
     linked: tuple[TargetSpec, ...] = ()
 
-    def undecided(self, reason: str) -> _Result:
-        nothing = Verdict(Status.UNDECIDED, reason, horizon=self.horizon)
+    def undecided(self, reason: Reason) -> _Result:
+        nothing = Verdict(Status.UNDECIDED, (reason,), horizon=self.horizon)
         return _Result(UnitResult([nothing] * len(self.targets), nothing), self.links(reason))
 
-    def links(self, relations: Sequence[Relation | str] | str) -> dict[tuple[Node, Node], Link]:
-        """Links to ``linked_nodes``; one text for all where nothing is known."""
-        many = [relations] * len(self.linked_nodes) if isinstance(relations, str) else relations
+    def links(self, relations: Sequence[Relation | Reason] | Reason) -> dict[tuple[Node, Node], Link]:
+        """Links to ``linked_nodes``; one reason for all where nothing is known."""
+        many = [relations] * len(self.linked_nodes) if isinstance(relations, Reason) else relations
         return {
             (self.node, node): Link(relation, self.horizon)
             for node, relation in zip(self.linked_nodes, many, strict=True)
@@ -310,7 +311,7 @@ class _Work:
         try:
             with one_core():
                 if self.end.is_over:
-                    return unit.undecided(f"the budget of {self.budget:g} s ended before this mode was examined")
+                    return unit.undecided(Reason(Outcome.NOT_BEGUN, budget=self.budget))
                 deadline = Deadline(self.end.left / rounds, self.end)
                 result = _examined(unit, deadline, progress, self.cuts)
                 return replace(result, cut_short=deadline.met)
@@ -318,7 +319,7 @@ class _Work:
             raise
         except Exception as error:
             note(f"mode {unit.mode.name!r}", error)
-            return unit.undecided(stopped(error))
+            return unit.undecided(engine_reason(error))
 
     @staticmethod
     def _result(future: Future[_Result], unit: _Unit) -> _Result:
@@ -328,4 +329,4 @@ class _Work:
                 return future.result()
             if not isinstance(error, _Stopped):
                 raise error
-        return unit.undecided("interrupted before this mode was examined")
+        return unit.undecided(Reason(Outcome.INTERRUPTED))

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modegraph.certify.continuous import ContinuousReferences
 from modegraph.certify.moments import at_state
 from modegraph.certify.proof import certified_for_some, certified_pair
-from modegraph.certify.references import Parameter, parameter_text
+from modegraph.certify.reason import Outcome, Reason, point
+from modegraph.certify.references import Parameter
 from modegraph.certify.relation import Part, Relation
 from modegraph.certify.targets.family import target_class
 from modegraph.certify.verdict import Status, Verdict, Witness
@@ -28,11 +28,11 @@ Key = tuple[str, int]
 class Link:
     """What is known of the switch between two nodes, one of them a whole continuous class.
 
-    ``relation`` is a text where there can be none. ``horizon`` in seconds (None: as far as the flowpipe went)
+    ``relation`` is a reason where there can be none. ``horizon`` in seconds (None: as far as the flowpipe went)
     belongs to the source.
     """
 
-    relation: Relation | str
+    relation: Relation | Reason
     horizon: float | None
 
 
@@ -68,15 +68,15 @@ class Classes:
     def verdict(self, source: Key, target: Key, p: Parameter, q: Parameter) -> Verdict:
         """One pair of references, given by their parameters where the class is continuous."""
         link = self.links[source, target]
-        if isinstance(link.relation, str):
-            return Verdict(Status.UNDECIDED, link.relation, horizon=link.horizon)
+        if isinstance(link.relation, Reason):
+            return Verdict(Status.UNDECIDED, (link.relation,), horizon=link.horizon)
         left, right = self.row(source[0], p), self.row(target[0], q)
         gauge = float(link.relation.crossings(left, right).gauge[0])
         if gauge <= 1.0:
             return certified_pair(link.relation, left, right, link.horizon)
         if link.relation.refuted(left, right)[0]:
             return _resting(link.relation, left, right)
-        return _missed(link, gauge)
+        return _missed(link, left, right, gauge)
 
     def row(self, name: str, p: Parameter) -> Floats:
         """A reference as one row (1, k) for a relation; without columns where the class is finite."""
@@ -90,25 +90,25 @@ class Classes:
     ) -> Verdict:
         """Whether some pair is certified, every pair refuted, or neither; a reference given is kept."""
         horizon = next(link.horizon for (s, t), link in self.links.items() if s[0] == i and t[0] == j)
-        texts = [
+        unusable = [
             link.relation for (s, t), link in self.links.items()
-            if s[0] == i and t[0] == j and isinstance(link.relation, str)
+            if s[0] == i and t[0] == j and isinstance(link.relation, Reason)
         ]  # fmt: skip
         best = refs.best(r_i, r_j)
         if best is None:
-            return Verdict(Status.UNDECIDED, texts[0] if texts else "no reference is left", horizon=horizon)
+            why = (*unusable, Reason(Outcome.NO_REFERENCE_LEFT))[:1]
+            return Verdict(Status.UNDECIDED, why, horizon=horizon)
         key, left, right, gauge = best
         link = self.links[(i, key[0]), (j, key[1])]
         assert isinstance(link.relation, Relation)
-        where = f"r_i = {_text(left)}, r_j = {_text(right)}"
+        where = {"r_i": point(left), "r_j": point(right)}
         if gauge <= 1.0:
-            return certified_for_some(link.relation, left[None], right[None], where, link.horizon)
-        if not texts and refs.all_refuted(r_i, r_j):
+            return certified_for_some(link.relation, left[None], right[None], link.horizon)
+        if not unusable and refs.all_refuted(r_i, r_j):
             told = _resting(link.relation, left[None], right[None])
-            reason = f"refuted for all references; closest {where}: {told.reason}"
-            return Verdict(Status.REFUTED, reason, margin=1.0 - gauge, witness=told.witness)
-        told = _missed(link, gauge)
-        return Verdict(Status.UNDECIDED, f"{told.reason}; closest {where}", margin=told.margin, horizon=link.horizon)
+            why = (Reason(Outcome.WHOLE_REGION_REFUTED, **where, why=told.why),)
+            return Verdict(Status.REFUTED, why, margin=1.0 - gauge, witness=told.witness)
+        return _missed(link, left[None], right[None], gauge)
 
     def entered(self, name: str, mode: Mode | Target, x: Floats) -> ContinuousReferences | None:
         """The references under which a mode may be entered from x (n,), proved; None: none is found."""
@@ -119,28 +119,22 @@ class Classes:
         return refs if best is not None and best[3] <= 1.0 else None
 
 
-def _text(p: NDArray[np.float64]) -> str:
-    return parameter_text(p) if len(p) else "the only one"
-
-
-def _missed(link: Link, gauge: float) -> Verdict:
+def _missed(link: Link, source: Floats, target: Floats, gauge: float) -> Verdict:
+    """What is missing for one pair (1, ki), (1, kj)."""
+    assert isinstance(link.relation, Relation)
     if not np.isfinite(gauge):
-        reason = "the flowpipe of the source does not get far enough for any instant to count"
-        return Verdict(Status.UNDECIDED, reason, horizon=link.horizon)
-    within = "" if link.horizon is None else f" within {link.horizon:g} s"
-    reason = (
-        f"no common time was found{within}: at best the worst part of the starts reaches "
-        f"{gauge:.3g} times the size of the target (1 is needed)"
-    )
-    return Verdict(Status.UNDECIDED, reason, margin=1.0 - gauge, horizon=link.horizon)
+        return Verdict(Status.UNDECIDED, (Reason(Outcome.NO_USABLE_INSTANT),), horizon=link.horizon)
+    part, time = link.relation.worst(source, target)
+    parts = link.relation.parts
+    reason = Reason(
+        Outcome.NO_COMMON_TIME, gauge=gauge, time=time, horizon=link.horizon, part=part + 1, parts=len(parts),
+        offset=point(parts[part].offset), r_i=point(source[0]), r_j=point(target[0]),
+    )  # fmt: skip
+    return Verdict(Status.UNDECIDED, (reason,), margin=1.0 - gauge, horizon=link.horizon)
 
 
 def _resting(relation: Relation, source: Floats, target: Floats) -> Verdict:
     assert relation.rest is not None
     x0 = np.array(relation.rest.at(source)[0][0])
-    reason = (
-        f"the centre {parameter_text(x0)} of the start set is an equilibrium without disturbance and lies outside the "
-        "target: that trajectory never reaches it"
-    )
     witness = Witness(x0, None, {}, 0.0, "trapped", source[0], target[0])
-    return Verdict(Status.REFUTED, reason, witness=witness, horizon=None)
+    return Verdict(Status.REFUTED, (Reason(Outcome.RESTS_OUTSIDE, x0=point(x0)),), witness=witness, horizon=None)

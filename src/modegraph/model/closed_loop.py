@@ -230,12 +230,7 @@ class _Trace:
         ]
         if missing:
             raise ModegraphError(f"{self.owner}, {role} reads {missing[0]!r}, but {_hint(missing[0], role)}")
-        try:
-            return call(function, available, role=role, owner=self.owner)
-        except ModegraphError as error:
-            if "read-only" not in str(error):
-                raise
-            raise ModegraphError(f"{error}; arguments must not be changed in place, begin with x = x.copy()") from error
+        return call(function, available, role=role, owner=self.owner)
 
     def _keep_obligations(self, written: Sequence[Expr], resolved: Sequence[Expr]) -> None:
         """``maximum(t - 1, 0) / x[0]`` is 0 before t = 1, but only where x[0] is not."""

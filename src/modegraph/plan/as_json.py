@@ -50,6 +50,7 @@ def verdict_data(v: Verdict) -> dict[str, Any]:
     return {
         "status": v.status.value,
         "reason": v.reason,
+        "why": [reason.data() for reason in v.why],
         "time": v.time,
         "margin": v.margin,
         "slack": dict(v.slack),

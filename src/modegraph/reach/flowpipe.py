@@ -23,6 +23,7 @@ from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.ladder import class_orders, is_light, orders
 from modegraph.reach.cover.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import Order
 from modegraph.reach.restrictor import Restrictor
 from modegraph.reach.slices import Slice, Slicer, hull, outline
@@ -78,7 +79,7 @@ class Flowpipe:
         states: Sequence[str],
         horizon: float,
         chains: Sequence[Chain],
-        stuck: str,
+        stuck: Failure | None,
         one_of: Restrictor | None = None,
     ) -> None:
         self.states = tuple(states)
@@ -102,8 +103,10 @@ class Flowpipe:
         if self.complete:
             self.reason = f"complete until t = {horizon:.6g} s ({pieces}, {self.steps} steps)"
         else:
-            first = min((chain for chain in chains if chain.failure), key=lambda chain: chain.time)
-            self.reason = f"{label}: {first.failure} (asked for t = {horizon:.6g} s; {pieces}{stuck})"
+            found = [(chain.time, chain.failure) for chain in chains if chain.failure is not None]
+            first = min(found, key=lambda item: item[0])[1]
+            end = "" if stuck is None else f"; {stuck}"
+            self.reason = f"{label}: {first.in_full} (asked for t = {horizon:.6g} s; {pieces}{end})"
 
     def at(self, t: float, r: ArrayLike | None = None) -> Box:
         """Box over states, then memory, around every state that is possible at time t (seconds).
@@ -303,7 +306,7 @@ class Cutting:
         self.compiled, self.end, self.deadline = compiled, end, deadline
         self.disturbed = bool(compiled.w_radius.any())
 
-    def run(self) -> tuple[list[Chain], str]:
+    def run(self) -> tuple[list[Chain], Failure | None]:
         """A chain for each piece, and why cutting ended where it failed."""
         whole = self.compiled.whole()
         if self.compiled.parameters:
@@ -311,10 +314,10 @@ class Cutting:
         else:
             ladder = orders(self.compiled, whole.variables)
         parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
-        stuck = ""
-        while not stuck and any(part.chain.failure for part in parts):
+        stuck: Failure | None = None
+        while stuck is None and any(part.chain.failure for part in parts):
             worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-            stuck = "; no more are tried"
+            stuck = Failure(Mechanism.NO_MORE_CUTS)
             if self.deadline.is_over or len(parts) >= MOST_PIECES:
                 break
             for k in self._places(worst.chain):
@@ -322,12 +325,12 @@ class Cutting:
                 if self._gained(worst.chain, [child.chain for child in children], k):
                     # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
                     parts = [part for part in parts if part is not worst] + children
-                    stuck = ""
+                    stuck = None
                     break
-                stuck = "; cutting it gets no further"
-        if self.disturbed and not stuck:
+                stuck = Failure(Mechanism.CUTS_DO_NOT_HELP)
+        if self.disturbed and stuck is None:
             parts = self._tightened(parts, ladder)
-        elif self.compiled.parameters and not stuck:
+        elif self.compiled.parameters and stuck is None:
             parts = self._tighter(parts, ladder)
         return [part.chain for part in parts], stuck
 

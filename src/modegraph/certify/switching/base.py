@@ -116,6 +116,11 @@ class Evidence(ABC):
         return 1
 
     @property
+    def sinks(self) -> bool:
+        """Whether some starts are there only when they have sunk in a funnel."""
+        return False
+
+    @property
     def nearest(self) -> Nearest | None:
         """The worst piece at its best instant; None where it is not kept."""
         return None

@@ -15,6 +15,7 @@ from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Floats
 from modegraph.deadline import Deadline
+from modegraph.reach.failure import Mechanism
 from modegraph.reach.flow.flow import Flow
 from modegraph.reach.tail.box import Tail
 from modegraph.reach.tail.decay import SettledLoop
@@ -171,6 +172,10 @@ class Sunk(Evidence):
         return least_slack([self.way.slack, own, self.sinking.slack()])
 
     @property
+    def sinks(self) -> bool:
+        return True
+
+    @property
     def nearest(self) -> Nearest | None:
         return self.arrival.nearest
 
@@ -197,7 +202,7 @@ class Funnels:
             if hit is not None and all(gauge_of(funnel.end, region) <= 1.0 for region in regions):
                 return Sinking(funnel, *hit, flow.time)
         if not (np.isfinite(p).all() and np.isfinite(G).all()):
-            return NoFunnel("the reach set is not bounded")
+            return NoFunnel(Mechanism.NOT_BOUNDED)
         points = sample_powers(flow.piece, flow.bounds.exponents) @ p.T
         rng = np.random.default_rng(11)
         points += np.sign(rng.uniform(-1.0, 1.0, (len(points), len(G)))) @ G[:, :, 0]
@@ -213,7 +218,7 @@ class Funnels:
                 return self._whole(flow, mouth, fit, regions)
             # Samples seldom reach the corners of what the remainder fills.
             room *= ROOM * found.gauge(flow.bounds, p, G)
-        return NoFunnel("the reach set is not inside the ellipsoid that shrinks")
+        return NoFunnel(Mechanism.NOT_IN_ELLIPSOID)
 
     def _whole(self, flow: Flow, mouth: Floats, fit: Floats, regions: Sequence[Region]) -> Sinking | NoFunnel:
         """The funnel with this mouth, followed until everything is in the regions."""
@@ -222,6 +227,6 @@ class Funnels:
             return found
         hit = found.enter(flow.bounds, *flow.state_set(len(flow.steps)))
         if hit is None:
-            return NoFunnel("the reach set is not inside the ellipsoid that shrinks")
+            return NoFunnel(Mechanism.NOT_IN_ELLIPSOID)
         self.known.append(found)
         return Sinking(found, *hit, flow.time)

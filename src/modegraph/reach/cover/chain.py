@@ -11,6 +11,7 @@ from modegraph.deadline import NEVER, Deadline
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.restart import WIDE_GAP, halved, restarted
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import LATE_FEEDBACK, RESTART_STEPS, Order
 from modegraph.reach.parallelotope import mode_gap
 from modegraph.reach.start.piece import Piece
@@ -30,8 +31,8 @@ class Chain:
         self.compiled = compiled
         first = compiled.flow(piece, order, lean=True)
         self.flows = [first]
-        self.failure = "" if first.failure is None else str(first.failure)
-        """Why it stopped; empty while it has not."""
+        self.failure: Failure | None = first.failure
+        """Why it stopped; None while it has not."""
         self.begun = first.failure is None
         self.shared = 0
         """Number of flows that other chains have too."""
@@ -43,10 +44,10 @@ class Chain:
                 return True
             flow = self.flows[-1]
             if self.deadline.is_over:
-                self.failure = f"at t = {flow.time:.6g} s the budget ended; give more, or shorten the horizon"
+                self.failure = Failure(Mechanism.OUT_OF_TIME, time=flow.time)
                 return False
             if not flow.advance(end):
-                self.failure = str(flow.failure)
+                self.failure = flow.failure
                 self._drop_unbounded()
                 return False
             if not self.compiled.linear and flow.wants_restart():
@@ -96,7 +97,7 @@ class Chain:
             whole = restarted([self.flows[k - 1]], whole.fields, compact=True) or whole
         for flow in halved(whole, nonlinear_variable(whole)):
             chain = copy(self)
-            chain.flows, chain.shared, chain.failure = [*self.flows[:k], flow], k, ""
+            chain.flows, chain.shared, chain.failure = [*self.flows[:k], flow], k, None
             found.append(chain)
         return found
 

@@ -13,15 +13,16 @@ from modegraph.enclosure.observe import observe_step, observed_bounds
 from modegraph.enclosure.rounding import UNIT
 from modegraph.enclosure.step import DONE, NO_CONTRACTION, flow_step
 from modegraph.expression.tape import Tape
-from modegraph.guarded import note, stopped
+from modegraph.guarded import note
 from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.failure import Failure, Mechanism, engine_stopped
 from modegraph.reach.field import Field
 from modegraph.reach.flow.breakdown import breakdown
 from modegraph.reach.flow.error_table import error_table
 from modegraph.reach.flow.framing import generator_box, into_frame, out_of_frame, thinned
 from modegraph.reach.flow.grid import next_instant
 from modegraph.reach.flow.passage import Passages
-from modegraph.reach.flow.records import Failure, Order, Step
+from modegraph.reach.flow.records import Order, Step
 from modegraph.reach.flow.step_control import MOST_TIME_DEGREE, error_guess, feeding_cap, time_degree
 from modegraph.reach.pointwise import evaluate_over, workspace
 from modegraph.reach.start.class_chart import start_polynomials
@@ -131,8 +132,7 @@ class Flow:
             self._cut = np.maximum(order.degree - fall, 2).astype(np.int64)
         G = np.zeros((0, n, self.small))
         if not np.isfinite(slack).all():
-            what = "the start set cannot be enclosed over so large a part of the class"
-            self.failure = Failure(0.0, what, "make the class smaller")
+            self.failure = Failure(Mechanism.CLASS_TOO_LARGE)
             slack = np.zeros(len(slack))
         if reset is not None and p.shape[0] < n:
             p, slack = self._with_memory(p, slack, reset)
@@ -173,10 +173,7 @@ class Flow:
         radius[: len(p)] = slack
         z, off, bad = self.evaluate(reset, inputs, radius)
         if bad >= 0 or not np.isfinite(off).all():
-            label = reset.labels[max(bad, 0)]
-            self.failure = Failure(
-                0.0, f"the reset of the memory is not defined on the whole start set ({label})", "shrink the start set"
-            )
+            self.failure = Failure(Mechanism.RESET_UNDEFINED, label=reset.labels[max(bad, 0)])
             off = np.zeros(k)
         return np.vstack([p, z]), np.concatenate([slack, off])
 
@@ -230,7 +227,8 @@ class Flow:
         except Exception as error:
             # What was proved until here stays proved.
             note(f"a step from t = {self.time:.6g} s", error)
-            self.failure = Failure(self.time, stopped(error), "report it, with the model")
+            mechanism, fields = engine_stopped(error)
+            self.failure = Failure(mechanism, **fields)
             return False
 
     def _advance(self, limit: float) -> bool:

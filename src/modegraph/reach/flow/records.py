@@ -1,4 +1,4 @@
-"""What a flowpipe is made of: degrees, steps, and the reason it cannot go on."""
+"""What a flowpipe is made of: degrees and steps."""
 
 from __future__ import annotations
 
@@ -20,18 +20,6 @@ class Order:
     degree: int
     jacobian: int
     weights: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why a flowpipe cannot go on: at what time, which mechanism, where, and what would help."""
-
-    time: float
-    mechanism: str
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"at t = {self.time:.6g} s {self.mechanism}; {self.remedy}"
 
 
 @dataclass

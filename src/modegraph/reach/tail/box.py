@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import TINY, UNIT
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.field import Field
 from modegraph.reach.float_loop import FloatLoop
 from modegraph.reach.flow.flow import Flow, Order
@@ -50,11 +51,10 @@ class Tail:
     decay: float
 
 
-@dataclass(frozen=True)
-class TailFailure:
+class TailFailure(Failure):
     """Why no invariant set was found."""
 
-    reason: str
+    __slots__ = ()
 
 
 def relevant_states(fld: Field) -> list[int]:
@@ -100,29 +100,26 @@ class TailSearch:
     def attempt(self, flows: Sequence[Flow]) -> Tail | TailFailure:
         """Try from the present end of the flows (all the pieces of the starts)."""
         if not self.possible:
-            return TailFailure("the loop still depends on time")
+            return TailFailure(Mechanism.DEPENDS_ON_TIME)
         keep = self.states
         n = self.fld.states
         if any(flow.time < self.fld.start for flow in flows):
-            return TailFailure("the reference still moves")
+            return TailFailure(Mechanism.REFERENCE_MOVES)
         start = max(flow.time for flow in flows)
         if not keep:
             return self._nothing_moves(flows, start)
         ends = [flow.set_at(len(flow.steps))[0][:, 0] for flow in flows]
         centre = self._floats.equilibrium(np.mean(ends, axis=0), keep)
         if centre is None:
-            return TailFailure("no equilibrium was found near the end of the flowpipe")
+            return TailFailure(Mechanism.NO_EQUILIBRIUM)
         self._tilt = self._moving(centre)
         slope = self._floats.jacobian(centre)[np.ix_(keep, keep)]
         if not np.isfinite(slope).all():
-            return TailFailure("the Jacobian at the equilibrium is not finite")
+            return TailFailure(Mechanism.JACOBIAN_NOT_FINITE)
         decay = -np.linalg.eigvals(slope).real.max()
         if not decay > 1e-9:
-            return TailFailure(
-                "the loop does not settle: its slowest mode has the rate "
-                f"{-decay:.3g} 1/s, so nothing can be said for all time"
-            )
-        reason = "the modes of the loop are nearly parallel"
+            return TailFailure(Mechanism.DOES_NOT_SETTLE, rate=-float(decay))
+        missed = TailFailure(Mechanism.PARALLEL_MODES)
         for frame in (modal_axes(slope), np.eye(len(keep))):
             widest = np.max([self._half_widths(flow, frame, centre) for flow in flows], axis=0)
             if not np.isfinite(widest).all():
@@ -137,8 +134,8 @@ class TailSearch:
                 found = self._returns(centre, axes, flows, start, decay)
                 if isinstance(found, Tail):
                     return found
-                reason = found.reason
-        return TailFailure(reason)
+                missed = found
+        return missed
 
     def _moving(self, centre: Floats) -> Floats:
         """How the equilibrium moves with the parameters of a class, (n, uncertain unknowns): secants through it."""
@@ -200,7 +197,7 @@ class TailSearch:
         k = len(keep)
         inside = [self._inside(flow, axes, centre) for flow in flows]
         if not all(inside):
-            return TailFailure("the reach set is not inside the candidate set")
+            return TailFailure(Mechanism.NOT_IN_CANDIDATE)
         chart = self.chart.around(centre, axes, self.chart.original)
         if self._tilt.any():
             chart = replace(chart, tilt=self._tilt)
@@ -215,16 +212,16 @@ class TailSearch:
         span = 25.0 / decay
         while flow.time < span and len(flow.steps) < 400:
             if not flow.advance(span):
-                return TailFailure(f"the flow of the candidate set stops {flow.failure}")
+                return TailFailure(Mechanism.CANDIDATE_STOPS, failure=flow.failure)
             upper = flow.steps[-1].face_upper
             if not (upper <= 0.0).all():
                 bad = self.fld.faces[int(np.argmax(~(upper <= 0.0)))]
-                return TailFailure(f"constraint '{bad}' cannot be proved on the candidate set")
+                return TailFailure(Mechanism.CONSTRAINT_IN_CANDIDATE, constraint=bad)
             if self._inside(flow, axes, centre):
                 return self._tail(flow, start, decay)
             if self.w_radius.any() and not self._tilt.any() and flow.feedback > TOO_MUCH_FEEDBACK:
-                return TailFailure("the disturbance fills the candidate set before it returns")
-        return TailFailure("the candidate set does not return into itself")
+                return TailFailure(Mechanism.CANDIDATE_FILLED)
+        return TailFailure(Mechanism.DOES_NOT_RETURN)
 
     def _half_widths(self, flow: Flow, axes: Floats, centre: Floats) -> Floats:
         keep = self.states

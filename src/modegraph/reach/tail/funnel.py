@@ -20,6 +20,7 @@ from modegraph.deadline import NEVER, Deadline
 from modegraph.enclosure.monomials import monomials
 from modegraph.enclosure.rounding import TINY, UNIT
 from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.float_loop import FloatLoop
 from modegraph.reach.pointwise import evaluate_over
 from modegraph.reach.start.piece import Chart, Piece
@@ -187,11 +188,10 @@ class Funnel:
         return NormBall(self.rungs[k].norm, radius, self.loop)
 
 
-@dataclass(frozen=True)
-class NoFunnel:
+class NoFunnel(Failure):
     """Why there is no funnel."""
 
-    reason: str
+    __slots__ = ()
 
 
 class FunnelBuilder:
@@ -248,19 +248,16 @@ class FunnelBuilder:
         """
         centre = self._floats.equilibrium(points.mean(axis=0), range(self.loop.fld.states))
         if centre is None:
-            return NoFunnel("no equilibrium was found near the end of the flowpipe")
+            return NoFunnel(Mechanism.NO_EQUILIBRIUM)
         slope = self._floats.jacobian(centre)
         if not np.isfinite(slope).all():
-            return NoFunnel("the Jacobian at the equilibrium is not finite")
+            return NoFunnel(Mechanism.JACOBIAN_NOT_FINITE)
         rate = -float(np.linalg.eigvals(slope).real.max())
         if not rate > 1e-6:
-            return NoFunnel(
-                f"the loop does not settle: its slowest mode has the rate {-rate:.3g} 1/s, so nothing can be said "
-                "for all time"
-            )
+            return NoFunnel(Mechanism.DOES_NOT_SETTLE, rate=-rate)
         found = self.loop.push(centre)
         if found is None:
-            return NoFunnel("the loop is not defined at its equilibrium for all unknowns")
+            return NoFunnel(Mechanism.UNDEFINED_AT_EQUILIBRIUM)
         push, box = found
         y = points - centre
         scale = np.abs(y).max(axis=0)
@@ -279,15 +276,9 @@ class FunnelBuilder:
             if narrowed > NARROWED or enough(last) or self.deadline.is_over:
                 break
         if not rungs:
-            if self.deadline.is_over:
-                return NoFunnel("the budget ended before an ellipsoid was proved to shrink")
-            return NoFunnel("no ellipsoid around the reach set is proved to shrink")
+            return NoFunnel(Mechanism.NO_TIME_FOR_ELLIPSOIDS if self.deadline.is_over else Mechanism.NO_ELLIPSOID)
         kept = usable(rungs)
-        return (
-            Funnel(self.loop, kept)
-            if kept
-            else NoFunnel("a constraint, or a bound of the inputs, fails in the ellipsoids that shrink")
-        )
+        return Funnel(self.loop, kept) if kept else NoFunnel(Mechanism.FUNNEL_CONSTRAINT)
 
     def _stage(
         self, centre: Floats, push: Floats, box: Floats, scale: Floats, rate: float, points: Floats,
