@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from enum import unique
 from typing import Any
 
 import numpy as np
@@ -97,8 +98,8 @@ def _no_common_time(
     if part is not None:
         around = "" if offset is None else f" (around the centre + {_short(offset)})"
         who = "the set of all starts" if parts == 1 else f"part {part} of {parts} of the starts{around}"
-    references = "" if r_i is None and r_j is None else f" for r_i = {_named(r_i)}, r_j = {_named(r_j)}"
-    return f"no common time was found{within}: at best (t = {time:.4g} s) {who} {_reach(gauge)}{references}"
+    references = "" if r_i is None and r_j is None else f", r_i = {_named(r_i)}, r_j = {_named(r_j)}"
+    return f"no common time was found{within}: at best (t = {time:.4g} s{references}) {who} {_reach(gauge)}"
 
 
 def _reach(gauge: float) -> str:
@@ -219,6 +220,7 @@ _LEAVE = "take this start out of the start set, or change the controller so that
 _BUDGET = "try a larger budget="
 
 
+@unique
 class Outcome(Kind):
     """Every answer there is: the text, and what would change it.
 
@@ -266,7 +268,7 @@ class Outcome(Kind):
         "please report it: this is a fault of modegraph, not of the model",
     )
     ENGINE_LIMIT = "{text}", "{text}"
-    UNUSABLE_TARGET = "{text}", "{text}"
+    UNUSABLE_TARGET = "the target cannot be used: {text}", "choose a target set of another kind"
     NO_REFERENCE_LEFT = "no reference is left", "name other references"
     NOTHING_FOUND = (
         "neither a proof nor a counterexample was found",
