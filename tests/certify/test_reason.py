@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from modegraph.certify.reason import Outcome, Reason
+from modegraph.certify.reason import Outcome, Reason, size_text
 from modegraph.certify.verdict import Status, Unproved, Verdict
 from modegraph.plan.as_json import json_text, verdict_data
 from modegraph.reach.failure import Failure, Mechanism
@@ -159,3 +159,17 @@ def test_a_verdict_as_data_has_its_reasons_for_programs() -> None:
         {"outcome": "not_for_ever", "until": 1.0, "why": {"mechanism": "filled", "time": 0.5}},
         {"outcome": "constraint_not_proved", "constraint": "c", "time": 0.0, "by": None},
     ]
+
+
+@pytest.mark.parametrize(
+    "gauge, said",
+    [
+        (1e294, "more than 1000 times the size"),
+        (2.5, "2.5 times the size"),
+        (1.0, "1 times the size"),
+        (1.0 + 3.2e-7, "the size of the target, and 3.2e-07 of it more"),
+        (1.0 - 1e-9, "the size of the target, and 1e-09 of it less"),
+    ],
+)
+def test_sizes_are_told_truly(gauge: float, said: str) -> None:
+    assert size_text(gauge).startswith(said)

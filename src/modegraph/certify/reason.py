@@ -116,6 +116,16 @@ def _reach(gauge: float) -> str:
     return "is within the size of the target, though not proved to be inside at one time"
 
 
+def size_text(gauge: float) -> str:
+    """How large something is against the target: never "1 times" where it is not, nor "1e+294 times"."""
+    excess = gauge - 1.0
+    if gauge > FAR:
+        return f"more than {FAR:g} times the size of the target"
+    if 0.0 < abs(excess) < CLOSE:
+        return f"the size of the target, and {abs(excess):.2g} of it {'more' if excess > 0.0 else 'less'}"
+    return f"{gauge:.4g} times the size of the target"
+
+
 def _larger_target(gauge: float, **_: Any) -> str:
     if gauge > FAR:
         return "a much smaller start set, or a controller that steers to the target, would help"
