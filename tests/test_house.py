@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import subprocess
@@ -133,3 +134,47 @@ def test_every_commit_is_checked_as_make_lint_does() -> None:
     hooks = re.findall(r"entry: (.+)", (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))
     assert hooks == [line.strip().replace("$(BIN)", ".venv/bin") for line in recipe.splitlines()[1:]]
     assert len(hooks) == 3
+
+
+PROSE = {"reason", "remedy", "failure", "in_full", "text", "message"}
+SEARCHES = {"partition", "rpartition", "split", "startswith", "endswith", "find", "index", "count", "removeprefix"}
+
+
+def reads_prose(tree: ast.AST) -> list[int]:
+    """Lines that look for words in the text of an error, a reason or another statement."""
+
+    def is_prose(node: ast.AST) -> bool:
+        if isinstance(node, ast.Call):
+            return isinstance(node.func, ast.Name) and node.func.id in {"str", "repr", "texts", "told"}
+        return isinstance(node, ast.Attribute) and node.attr in PROSE
+
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            prose = any(map(is_prose, sides))
+            words = any(isinstance(side, ast.Constant) and isinstance(side.value, str) and side.value for side in sides)
+            member = any(isinstance(op, ast.In | ast.NotIn) for op in node.ops)
+            found += [node.lineno] * bool(prose and (member or words))
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            found += [node.lineno] * (node.func.attr in SEARCHES and is_prose(node.func.value))
+    return found
+
+
+@pytest.mark.parametrize("path", FILES.values(), ids=lambda p: str(p.relative_to(SOURCE)))
+def test_no_code_reads_prose(path: Path) -> None:
+    assert not reads_prose(ast.parse(path.read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "sunk.reason.partition(':')[0]",
+        "'read-only' not in str(error)",
+        "sunk.mechanism in course.reason",
+        "verdict.reason == 'the budget ended'",
+        "b.failure.startswith('at t')",
+    ],
+)
+def test_reading_prose_would_be_seen(code: str) -> None:
+    assert reads_prose(ast.parse(code))

@@ -12,6 +12,7 @@ from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
 from modegraph.certify.unit import TargetSpec
 from modegraph.deadline import Deadline
+from modegraph.reach.failure import Mechanism
 from tests.certify.class_graphs import double_integrators, one_integrator
 
 SQUARE = mg.Box([-1.0, -1.0], [1.0, 1.0])
@@ -27,7 +28,8 @@ def test_what_cannot_be_a_target_is_told_and_the_rest_is_related() -> None:
     mode = one_integrator(lambda r: r, lambda r: mg.Ball(r, 0.1), SQUARE, "mode")
     level = mg.Target("level", mg.Sublevel(lambda x: x[0] ** 4 + x[1] ** 2, 1.0))
     found = related(mode, [level, mode])
-    assert "'level'" in found.relations[0]
+    assert found.relations[0].outcome is mg.Outcome.UNUSABLE_TARGET
+    assert "'level'" in str(found.relations[0])
     assert isinstance(found.relations[1], Relation)
     assert found.check.status is mg.Status.CERTIFIED
 
@@ -75,3 +77,22 @@ def test_a_class_is_safe_for_ever_though_a_state_that_nobody_reads_drifts() -> N
     )  # fmt: skip
     check = related(mode, [mode]).check
     assert check.status is mg.Status.CERTIFIED, check.reason
+
+
+def test_a_check_that_fails_names_the_constraint_and_when() -> None:
+    """At 0.1 e^-t from its reference, the loop breaks t |x - r| <= 0.01 soon, though not at the start."""
+    mode = mg.Mode(
+        "mode", mg.System(lambda x, u: u, states="a", inputs="u"), controller=lambda x, r: r - x,
+        reference=mg.setpoint(mg.Box([-1.0], [1.0])), start=lambda r: mg.Ball(r, 0.1),
+        constraints=lambda x, r, t: {"late": t * (x[0] - r[0]) <= 0.01},
+    )  # fmt: skip
+    check = related(mode, [mode]).check
+    assert check.status is mg.Status.UNDECIDED
+    forever, constraint = check.why
+    assert forever.fields["why"].mechanism is Mechanism.ENDS_BEFORE_SETTLED
+    assert constraint.outcome is mg.Outcome.CONSTRAINT_NOT_PROVED
+    assert constraint.fields["constraint"] == "late"
+    assert constraint.fields["by"] > 0.0
+    assert check.until is not None
+    assert constraint.fields["time"] == pytest.approx(check.until)
+    assert forever.fields["until"] == check.until

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from modegraph.certify.findings import Findings, merge
+from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.switching.common_time import Missed
 from modegraph.certify.verdict import Unproved
+from modegraph.reach.failure import Failure, Mechanism
 from tests.certify.given import safety, switch
 
 MISSED = Missed(2.0, 1.0, True, np.zeros(1))
-EMPTY = Findings(missed={0: MISSED}, failure="at t = 0 s", unproved=Unproved("c", 0.0, 1.0), empty=True)
+ENDED = Reason(Outcome.FLOWPIPE_ENDED, failure=Failure(Mechanism.FILLED, time=0.0))
+EMPTY = Findings(missed={0: MISSED}, failure=ENDED, unproved=Unproved("c", 0.0, 1.0), empty=True)
 
 
 def undecided() -> Findings:
@@ -47,3 +50,21 @@ def test_what_has_empty_parts_only_is_empty_and_proves_nothing(parts: list[Findi
     assert found.empty
     assert not found.proofs
     assert found.safety is None
+
+
+def test_the_whole_tells_why_its_parts_have_no_tail() -> None:
+    missing = (Failure(Mechanism.DOES_NOT_RETURN),)
+    found = merge(undecided(), [proved(1.0), Findings(missed={0: MISSED}, no_tail=missing)], [0], True)
+    assert found.no_tail == missing
+    own = (Failure(Mechanism.REFERENCE_MOVES),)
+    kept = Findings(missed={0: MISSED}, no_tail=own)
+    assert merge(kept, [Findings(missed={0: MISSED}, no_tail=missing)], [0], True).no_tail == own
+
+
+@pytest.mark.parametrize("why", [Unproved("c", 1.0, 0.5), Unproved("c", 1.0, 0.5).reason])
+def test_a_part_that_cannot_go_on_alone_says_why(why: Unproved | Reason) -> None:
+    found = Findings()
+    found.unpark(why)
+    assert found.failure is not None
+    assert found.failure.fields["why"] == Unproved("c", 1.0, 0.5).reason
+    assert "too large to go on alone: constraint 'c' cannot be proved" in str(found.failure)

@@ -9,6 +9,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.continuous import ContinuousReferences
+from modegraph.certify.relation import Relation
 from tests.certify.class_graphs import double_integrators, one_integrator
 
 
@@ -137,3 +138,15 @@ def test_the_volume_of_what_is_curved_is_proved_by_cells() -> None:
     assert 0.9 * share <= lower <= 1.03 * share
     # A start rests at every reference: nothing farther than the radius .25 of the target can be certified.
     assert upper <= 1.04 * (16.0 - (4.0 - 0.25) ** 2)
+
+
+def test_the_part_and_the_instant_that_decide_a_pair_are_those_told(case: tuple[int, ContinuousReferences]) -> None:
+    """Shrinking all the way, a set from which r_j is too far is nearest at the end of the horizon."""
+    dim, refs = case
+    relation = refs.relations[0, 0]
+    source, target = np.zeros((1, dim)), np.full((1, dim), 0.5)
+    part, when = relation.worst(source, target)
+    assert 0 <= part < len(relation.parts)
+    assert when == pytest.approx(20.0)
+    alone = Relation(relation.region, relation.goal, (relation.parts[part],), None)
+    assert alone.crossings(source, target).gauge[0] == relation.crossings(source, target).gauge[0] > 1.0

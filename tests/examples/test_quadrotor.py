@@ -102,3 +102,18 @@ def test_the_library_flies_it_in_a_wind_of_the_users(plan: Any) -> None:
 def test_tasks_of_the_module(quadrotor: Any) -> None:
     for task in load("quadrotor").tasks.values():
         assert quadrotor.plan(**task).modes[-1] == task["goal"]
+
+
+@pytest.mark.parametrize("target", ["climb", "cruise", "land"])
+def test_a_descent_that_starts_where_another_mode_does_is_said_to_touch_it(quadrotor: Any, target: str) -> None:
+    """The starts are equal: at t = 0 they fill the target, and only what is allowed for rounding is missing."""
+    verdict = quadrotor.verdict("land", target)
+    (reason,) = verdict.why
+    assert reason.outcome is mg.Outcome.NO_COMMON_TIME
+    assert reason.fields["time"] == 0.0
+    assert 0.0 < reason.fields["gauge"] - 1.0 < 1e-5
+    assert reason.fields["gauge"] == pytest.approx(1.0 - verdict.margin, abs=0.0)
+    assert reason.fields["r_j"][0] == pytest.approx(reason.fields["r_i"][0])
+    assert "(t = 0 s, " in verdict.reason
+    assert "misses" in verdict.reason
+    assert "reaches 1 times" not in verdict.reason

@@ -113,7 +113,7 @@ def merge(found: Findings, parts: Sequence[Findings], wanted: Sequence[int], saf
         found.safety = safe_together([part.safety for part in parts])
         if found.safety is None:
             found.safe_until = max(found.safe_until, min(part.safe_until for part in parts))
-            found.no_tail = next((part.no_tail for part in parts if part.safety is None), ()) or found.no_tail
+            found.no_tail = found.no_tail or next((part.no_tail for part in parts if part.no_tail), ())
     if all(not part.failure for part in parts):
         found.failure = None
     if all(not part.unproved for part in parts):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from enum import unique
 from typing import Any
 
 import numpy as np
@@ -98,8 +99,8 @@ def _no_common_time(
     if part is not None:
         around = "" if offset is None else f" (around the centre + {_short(offset)})"
         who = "the set of all starts" if parts == 1 else f"part {part} of {parts} of the starts{around}"
-    references = "" if r_i is None and r_j is None else f" for r_i = {_named(r_i)}, r_j = {_named(r_j)}"
-    return f"no common time was found{within}: at best (t = {time:.4g} s) {who} {_reach(gauge)}{references}"
+    references = "" if r_i is None and r_j is None else f", r_i = {_named(r_i)}, r_j = {_named(r_j)}"
+    return f"no common time was found{within}: at best (t = {time:.4g} s{references}) {who} {_reach(gauge)}"
 
 
 def _reach(gauge: float) -> str:
@@ -114,6 +115,16 @@ def _reach(gauge: float) -> str:
     if excess > 0.0:
         return f"touches the target, and misses it by {excess:.2g} of its size, no more than is allowed for rounding"
     return "is within the size of the target, though not proved to be inside at one time"
+
+
+def size_text(gauge: float) -> str:
+    """How large something is against the target: never "1 times" where it is not, nor "1e+294 times"."""
+    excess = gauge - 1.0
+    if gauge > FAR:
+        return f"more than {FAR:g} times the size of the target"
+    if 0.0 < abs(excess) < CLOSE:
+        return f"the size of the target, and {abs(excess):.2g} of it {'more' if excess > 0.0 else 'less'}"
+    return f"{gauge:.4g} times the size of the target"
 
 
 def _larger_target(gauge: float, **_: Any) -> str:
@@ -220,6 +231,7 @@ _LEAVE = "take this start out of the start set, or change the controller so that
 _BUDGET = "try a larger budget="
 
 
+@unique
 class Outcome(Kind):
     """Every answer there is: the text, and what would change it.
 
@@ -267,7 +279,7 @@ class Outcome(Kind):
         "please report it: this is a fault of modegraph, not of the model",
     )
     ENGINE_LIMIT = "{text}", "{text}"
-    UNUSABLE_TARGET = "{text}", "{text}"
+    UNUSABLE_TARGET = "the target cannot be used: {text}", "choose a target set of another kind"
     NO_REFERENCE_LEFT = "no reference is left", "name other references"
     NOTHING_FOUND = (
         "neither a proof nor a counterexample was found",

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from modegraph.certify.approach import OWN_SIZE
+from modegraph.certify.reason import size_text
 from modegraph.certify.references import Parameter, parameter_text
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Widths
 from modegraph.explain.repairs import Repair
@@ -124,11 +125,11 @@ def _approach_lines(e: Explanation) -> list[str]:
     certified = e.verdict.status is Status.CERTIFIED
     if e.closest is not None and e.closest is not e.reach:
         lines.append(
-            f"  closest approach of the counterexample (validated): {e.closest.gauge:.4g} times the size of the target "
+            f"  closest approach of the counterexample (validated): {size_text(e.closest.gauge)} "
             f"at t = {e.closest.time:.4g} s"
         )
     if e.reach is not None:
-        at = f"{e.reach.gauge:.4g} times the size of the target at t = {e.reach.time:.4g} s"
+        at = f"{size_text(e.reach.gauge)} at t = {e.reach.time:.4g} s"
         what = "deepest inside" if certified else "closest approach"
         lines.append(f"  {what}, of all that the worst part of the starts can reach: {at}")
     if e.block is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import unique
 from typing import Any
 
 from modegraph.errors import ModegraphError
@@ -22,6 +23,7 @@ def _stopped_remedy(failure: Statement) -> str:
     return failure.remedy
 
 
+@unique
 class Mechanism(Kind):
     """What stood in the way, and what would help. ``time``: seconds after entering the mode."""
 

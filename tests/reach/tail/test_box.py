@@ -11,6 +11,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.unit import compile_mode
+from modegraph.reach.failure import Mechanism
 from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.tail.box import Tail, TailFailure, TailSearch, relevant_states
 from tests.soundness.families import Family, pendulum, references, runs
@@ -123,7 +124,7 @@ def test_a_class_of_references_has_one_invariant_set_for_all() -> None:
     search = TailSearch(
         compiled.fields[-1], flow.piece.chart, compiled.w_centre, compiled.w_radius, flow.names, Order(4, 3)
     )
-    found: Tail | TailFailure = TailFailure("")
+    found: Tail | TailFailure = TailFailure(Mechanism.DOES_NOT_RETURN)
     while not isinstance(found, Tail) and flow.time < 4.0 and flow.advance(4.0):
         found = search.attempt([flow])
     assert isinstance(found, Tail), found

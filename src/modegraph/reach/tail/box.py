@@ -118,7 +118,7 @@ class TailSearch:
             return TailFailure(Mechanism.JACOBIAN_NOT_FINITE)
         decay = -np.linalg.eigvals(slope).real.max()
         if not decay > 1e-9:
-            return TailFailure(Mechanism.DOES_NOT_SETTLE, rate=-float(decay))
+            return TailFailure(Mechanism.DOES_NOT_SETTLE, rate=0.0 - float(decay))
         missed = TailFailure(Mechanism.PARALLEL_MODES)
         for frame in (modal_axes(slope), np.eye(len(keep))):
             widest = np.max([self._half_widths(flow, frame, centre) for flow in flows], axis=0)

@@ -254,7 +254,7 @@ class FunnelBuilder:
             return NoFunnel(Mechanism.JACOBIAN_NOT_FINITE)
         rate = -float(np.linalg.eigvals(slope).real.max())
         if not rate > 1e-6:
-            return NoFunnel(Mechanism.DOES_NOT_SETTLE, rate=-rate)
+            return NoFunnel(Mechanism.DOES_NOT_SETTLE, rate=0.0 - rate)
         found = self.loop.push(centre)
         if found is None:
             return NoFunnel(Mechanism.UNDEFINED_AT_EQUILIBRIUM)

@@ -9,7 +9,6 @@ Floats = NDArray[np.float64]
 
 LEAST = 1e-7
 """Multiples of the weight below this are none."""
-ACCEPTED = ("Solved", "AlmostSolved")
 
 
 def shrinking_ellipsoid(
@@ -88,7 +87,7 @@ def shrinking_ellipsoid(
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix((count, count)), q, A, np.concatenate(constants), cones, settings
     ).solve()
-    if str(solution.status) not in ACCEPTED:
+    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
     x = np.array(solution.x)
     if not x[-1] > LEAST:
