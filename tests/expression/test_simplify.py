@@ -159,12 +159,12 @@ def test_the_time_limit_holds() -> None:
     for k in range(40):
         e = (e * (x[k % 8] + k) + np.sin(x[(k + 1) % 8])) / (1 + x[(k + 3) % 8] ** 2 + e * e)
     begin = time.perf_counter()
-    result = simplify([e, e * x[0]], seconds=0.5)
+    result = simplify([e, e * x[0]], work=5e5)
     assert time.perf_counter() - begin < 1.5
     points = np.random.default_rng(0).uniform(-1, 1, (8, 20))
     before, after = (Evaluator(compile_tape(v, list(x)))(points) for v in ([e], result.exprs[:1]))
     np.testing.assert_allclose(after, before, rtol=1e-6)
-    assert simplify([e], seconds=0.0).exprs[0].same(e)
+    assert simplify([e], work=0.0).exprs[0].same(e)
 
 
 def test_an_identically_zero_denominator_is_an_error() -> None:
