@@ -35,7 +35,8 @@ from modegraph.expression.work import TooBig, Work
 
 RATIONAL = frozenset((CONST, ADD, SUB, MUL, SQR, MULC, ADDC, RECIP))
 SAME = 50
-"""Nodes compared with a polynomial."""
+DEEPEST = 400
+"""Nodes compared with a polynomial, and degrees, added up, of one that is nested by recursion."""
 
 NEST, NODE = 0.1, 0.6
 """Work of a term and atom looked at when a sum is nested, and of a node visited."""
@@ -279,11 +280,14 @@ class Field:
         return ways
 
     def _horner(self, p: Polynomial, nodes: list[int]) -> int:
-        self.work.require(self._ring.term * len(p))
-        terms = {tuple(map(int, m)): _fraction(c) for m, c in p.to_dict().items()}
         # The user's own form wins a tie: gains times small differences round better than expanded sums.
         choices = [node for known, node in self._named.get(len(p), ())[:SAME] if known == p]
-        choices.append(_nest(self.graph, terms, nodes, self.work))
+        if sum(p.degrees()) <= DEEPEST:
+            self.work.require(self._ring.term * len(p))
+            terms = {tuple(map(int, m)): _fraction(c) for m, c in p.to_dict().items()}
+            choices.append(_nest(self.graph, terms, nodes, self.work))
+        if not choices:
+            raise TooBig
         return min(choices, key=lambda k: cost(self.graph, [k], self.work))
 
 
@@ -302,7 +306,7 @@ def _nest(graph: Nodes, terms: Terms, nodes: list[int], work: Work) -> int:
     """Greedy multivariate Horner scheme: the atom that occurs in most terms is taken out first."""
     if not terms:
         return graph.number(ZERO)
-    work.require(CALL + NEST * len(terms) * (1 + len(nodes)))
+    work.require(CALL + NEST * len(terms) * (6 + len(nodes)))
     if len(terms) > 1:
         counts = [sum(1 for m in terms if m[k]) for k in range(len(nodes))]
         best = max(range(len(nodes)), key=counts.__getitem__, default=0)
