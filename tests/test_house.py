@@ -90,6 +90,13 @@ def test_files_are_short_and_well_named(path: Path) -> None:
     assert path.stem not in {"utils", "helpers", "misc", "common"}
 
 
+def test_models_and_expressions_read_no_clock() -> None:
+    """What is simplified, and how a set is searched, depends on the model alone, not on a busy machine."""
+    clocks = re.compile(r"^\s*(import|from) (time|datetime|random)\b|default_rng\(\)", re.M)
+    readers = {p.relative_to(SOURCE) for p in FILES.values() if clocks.search(p.read_text(encoding="utf-8"))}
+    assert not {str(p) for p in readers if p.parts[0] in ("expression", "model")}
+
+
 def test_numba_lives_in_enclosure_only() -> None:
     users = {p.relative_to(SOURCE).parts[0] for p in FILES.values() if re.search(r"(import|from) numba", p.read_text())}
     assert users <= {"enclosure"}

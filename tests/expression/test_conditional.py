@@ -69,3 +69,9 @@ def test_concrete_conditions_choose() -> None:
     x = Graph().variable("x")
     assert np.where(True, x, 0.0).same(x)
     assert np.where(x.graph.constant(1) > 2, x, 0.0).value == 0
+
+
+def test_a_choice_of_high_degree_is_no_endless_recursion() -> None:
+    # (x^1500 - 1) / (x - 1) has 1500 terms, and nested as many levels.
+    x, y = Graph().variables("xy")
+    assert "where(" in np.where(x > 1, x**1500 - 1, 0 * y).text(400)

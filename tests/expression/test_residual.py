@@ -15,7 +15,7 @@ from modegraph.expression.scalar import Expr, Graph
 from modegraph.expression.trace import call
 from modegraph.model.sets.level_function import exact_value
 
-SECONDS = 1.0
+WORK = 1e6
 
 
 def traced(function: Callable[..., Any], count: int) -> tuple[Graph, list[Expr], list[Expr]]:
@@ -46,7 +46,7 @@ def near_model(x: Any) -> Any:
 
 def test_what_a_controller_inverts_comes_out() -> None:
     graph, x, (e,) = traced(near_model, 3)
-    (found,) = residual([e], x, typical(3), [], seconds=SECONDS)
+    (found,) = residual([e], x, typical(3), [], work=WORK)
     assert not found.same(e)
     assert same(graph, e, found, 3)
     # What is multiplied with the reciprocal is the rest alone.
@@ -64,8 +64,8 @@ def test_an_unknown_constant_is_taken_at_its_middle() -> None:
     graph, x, (e,) = traced(function, 3)
     values = typical(3)
     values[2] = np.linspace(0.9, 1.1, 8)
-    (plain,) = residual([e], x, values, [], seconds=SECONDS)
-    (found,) = residual([e], x, values, [x[2]], seconds=SECONDS)
+    (plain,) = residual([e], x, values, [], work=WORK)
+    (found,) = residual([e], x, values, [x[2]], work=WORK)
     assert plain.same(e)
     assert not found.same(e)
     assert same(graph, e, found, 3)
@@ -82,20 +82,20 @@ def test_an_unknown_constant_is_taken_at_its_middle() -> None:
 )
 def test_a_fraction_without_a_small_rest_stays(function: Callable[..., Any]) -> None:
     _, x, (e,) = traced(function, 3)
-    (found,) = residual([e], x, typical(3), [], seconds=SECONDS)
+    (found,) = residual([e], x, typical(3), [], work=WORK)
     assert found.same(e)
 
 
 def test_sizes_that_are_not_finite_prove_nothing_and_change_nothing() -> None:
     _, x, (e,) = traced(near_model, 3)
-    (found,) = residual([e], x, np.full((3, 4), np.nan), [], seconds=SECONDS)
+    (found,) = residual([e], x, np.full((3, 4), np.nan), [], work=WORK)
     assert found.same(e)
 
 
-def test_without_time_everything_stays() -> None:
+def test_without_work_everything_stays() -> None:
     _, x, (e,) = traced(near_model, 3)
-    assert residual([e], x, typical(3), [], seconds=-1.0)[0].same(e)
-    assert residual([], x, typical(3), [], seconds=SECONDS) == []
+    assert residual([e], x, typical(3), [], work=0.0)[0].same(e)
+    assert residual([], x, typical(3), [], work=WORK) == []
 
 
 def test_random_fractions_keep_their_values() -> None:
@@ -109,7 +109,7 @@ def test_random_fractions_keep_their_values() -> None:
             return np.array([(d * (x[2] + b * x[3]) + 0.2 * c * x[3]) / d, (d**2 + x[2]) / (d * (3.0 + x[3] ** 2))])
 
         graph, x, exprs = traced(function, 4)
-        found = residual(exprs, x, typical(4), [x[1]], seconds=SECONDS)
+        found = residual(exprs, x, typical(4), [x[1]], work=WORK)
         for e, new in zip(exprs, found, strict=True):
             changed += not e.same(new)
             assert same(graph, e, new, 4)

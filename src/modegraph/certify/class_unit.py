@@ -150,7 +150,7 @@ def _resting(mode: Mode, p: Floats | None, compiled: CompiledMode) -> TargetClas
     known |= {w.index: graph.constant(0).index for w in loop.disturbance}
     dropped = len(graph.dropped)
     rates = [Expr(graph, k) for k in graph.rewrite([e.index for e in segment.rhs], known=known)]
-    rates = simplify(rates, seconds=0.5).exprs
+    rates = simplify(rates, work=5e5).exprs
     del graph.dropped[dropped:]
     if not all(e.is_constant and e.value == 0 for e in rates):
         return None

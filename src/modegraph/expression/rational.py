@@ -2,16 +2,16 @@
 
 Atoms are variables and the nodes that are not rational operations (sin, exp, max(., 0), ...). A form is a
 polynomial over a product of known denominator factors; cancellation is exact division by a factor, so no
-multivariate greatest common divisor (whose cost cannot be bounded beforehand) is ever taken.
+multivariate greatest common divisor (whose cost cannot be bounded beforehand) is ever taken. Every operation
+is counted as work, from the sizes of its operands, before it is done.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from modegraph.expression.graph import ONE, ZERO, Nodes
 from modegraph.expression.ops import (
@@ -25,37 +25,32 @@ from modegraph.expression.ops import (
     MUL,
     MULC,
     RECIP,
-    RELU,
     SIN,
     SQR,
     SUB,
     VAR,
 )  # fmt: skip
-
-if TYPE_CHECKING:
-    from modegraph.expression.scalar import Expr
-
-Polynomial = Any
-"""flint.fmpq_mpoly; python-flint ships no usable stubs for it."""
+from modegraph.expression.polynomials import CALL, TERMS, Polynomial, Ring
+from modegraph.expression.work import TooBig, Work
 
 RATIONAL = frozenset((CONST, ADD, SUB, MUL, SQR, MULC, ADDC, RECIP))
-TERMS = 4000
-PRODUCTS = 400_000
 SAME = 50
-"""Limits on terms of a polynomial, term products of a multiplication, nodes compared with a polynomial."""
+DEEPEST = 400
+"""Nodes compared with a polynomial, and degrees, added up, of one that is nested by recursion."""
+
+NEST, NODE = 0.1, 0.6
+"""Work of a term and atom looked at when a sum is nested, and of a node visited."""
 
 WEIGHTS = {ADD: 0.1, SUB: 0.1, MULC: 0.1, ADDC: 0.1, CONST: 0.0, VAR: 0.0, RECIP: 3.0} | dict.fromkeys(
     (SIN, COS, EXP, LOG, ATAN), 4.0
 )
 
 
-def cost(graph: Nodes, roots: list[int]) -> float:
-    """Work of a tape with these roots; operations without a weight count 1."""
-    return sum(WEIGHTS.get(graph.nodes[k].op, 1.0) for k in graph.reachable(roots))
-
-
-class TooBig(Exception):
-    """The form would exceed the term limit, or the time is over."""
+def cost(graph: Nodes, roots: list[int], work: Work) -> float:
+    """What a tape with these roots costs; operations without a weight count 1."""
+    nodes = graph.reachable(roots)
+    work.add(NODE * len(nodes))
+    return sum(WEIGHTS.get(graph.nodes[k].op, 1.0) for k in nodes)
 
 
 @dataclass
@@ -74,35 +69,28 @@ class Field:
     graph : the graph the atoms belong to
     atoms : node numbers; in the order of creation
     reduce : apply sin^2 = 1 - cos^2 and exp(log(a) / 2)^2 = a
-    deadline : `time.monotonic` value after which every operation raises `TooBig`
+    work : every operation is counted, and raises `TooBig` where so much is not left
     """
 
-    def __init__(self, graph: Nodes, atoms: Sequence[int], *, reduce: bool, deadline: float) -> None:
-        import flint
-
-        self._flint = flint
+    def __init__(self, graph: Nodes, atoms: Sequence[int], *, reduce: bool, work: Work) -> None:
         self.graph = graph
-        self.deadline = deadline
+        self.work = work
         self._reduce = reduce
         # Lexicographic with later atoms first, and a sine before its cosine: relations rewrite downwards.
         self.atoms = sorted(atoms, key=lambda k: k + 1.5 if graph.nodes[k].op == SIN else k, reverse=True)
-        names = [f"a{k}" for k in range(max(len(self.atoms), 1))]
-        self._ring = flint.fmpq_mpoly_ctx.get(names, flint.Ordering.lex)
-        self._generators = self._ring.gens()
+        self._ring = Ring(len(self.atoms), work)
         self.position = {atom: k for k, atom in enumerate(self.atoms)}
-        self._relations: list[tuple[int, Polynomial]] = []
         self.factors: list[Polynomial] = []
         self.reciprocals: list[int | None] = []
         self._named: dict[int, list[tuple[Polynomial, int]]] = {}
-        self._one = self._ring.constant(1) if hasattr(self._ring, "constant") else self._generators[0] * 0 + 1
 
     def constant(self, value: Fraction) -> Form:
         """A number."""
-        return Form(self._one * self._flint.fmpq(value.numerator, value.denominator))
+        return Form(self._ring.one * self._ring.number(value))
 
     def atom(self, index: int) -> Form:
         """An atom of the field, by node number."""
-        return Form(self._generators[self.position[index]])
+        return Form(self._ring.generators[self.position[index]])
 
     def name(self, form: Form, node: int) -> None:
         """Remember a node that has this form, to be used instead of an expansion."""
@@ -113,35 +101,7 @@ class Field:
         """Let the square of an atom be a polynomial in atoms that come later in the order."""
         if not self._reduce or square.powers or len(square.numerator) > TERMS // 20:
             return
-        relation = atom.numerator**2 - square.numerator
-        lead = relation.monoms()[0]
-        if sum(lead) == 2 and max(lead) == 2:
-            self._relations.append((lead.index(2), relation / relation.leading_coefficient()))
-
-    def _check(self, terms: int) -> None:
-        if terms > PRODUCTS or time.monotonic() > self.deadline:
-            raise TooBig
-
-    def _normal(self, p: Polynomial) -> Polynomial:
-        if len(p) > TERMS:
-            raise TooBig
-        for _ in range(8):
-            degrees = p.degrees()
-            relations = [r for k, r in self._relations if degrees[k] >= 2]
-            if not relations:
-                break
-            for relation in relations:
-                p = divmod(p, relation)[1]
-        return p
-
-    def _times(self, p: Polynomial, q: Polynomial) -> Polynomial:
-        self._check(len(p) * len(q))
-        return self._normal(p * q)
-
-    def _divided(self, p: Polynomial, q: Polynomial) -> Polynomial | None:
-        self._check(len(p))
-        quotient, rest = divmod(p, q)
-        return None if rest else quotient
+        self._ring.relate(atom.numerator**2 - square.numerator)
 
     def _lowest(self, form: Form) -> Form:
         if not form.numerator:
@@ -150,7 +110,7 @@ class Field:
         p = form.numerator
         for k in form.powers:
             while powers[k]:
-                quotient = self._divided(p, self.factors[k])
+                quotient = self._ring.divided(p, self.factors[k])
                 if quotient is None:
                     break
                 p, powers[k] = quotient, powers[k] - 1
@@ -158,22 +118,23 @@ class Field:
 
     def product(self, powers: dict[int, int]) -> Polynomial:
         """The polynomial of a denominator."""
-        p = self._one
+        p = self._ring.one
         for k, e in powers.items():
             for _ in range(e):
-                p = self._times(p, self.factors[k])
+                p = self._ring.times(p, self.factors[k])
         return p
 
     def add(self, a: Form, b: Form, sign: int = 1) -> Form:
         """a + b or a - b."""
+        self.work.require(self._ring.reading(a.numerator, b.numerator))
         if a.powers == b.powers:
             numerator = a.numerator + b.numerator if sign > 0 else a.numerator - b.numerator
             total = Form(numerator, a.powers)
         else:
-            keys = {*a.powers, *b.powers}
+            keys = sorted({*a.powers, *b.powers})
             powers = {k: max(a.powers.get(k, 0), b.powers.get(k, 0)) for k in keys}
-            left = self._times(a.numerator, self.product({k: e - a.powers.get(k, 0) for k, e in powers.items()}))
-            right = self._times(b.numerator, self.product({k: e - b.powers.get(k, 0) for k, e in powers.items()}))
+            left = self._ring.times(a.numerator, self.product({k: e - a.powers.get(k, 0) for k, e in powers.items()}))
+            right = self._ring.times(b.numerator, self.product({k: e - b.powers.get(k, 0) for k, e in powers.items()}))
             total = Form(left + right if sign > 0 else left - right, powers)
         if len(total.numerator) > TERMS:
             raise TooBig
@@ -189,24 +150,26 @@ class Field:
         for part, whole in ((left, b.powers), (right, a.powers)):
             for k, e in whole.items():
                 powers[k] -= e - part.powers.get(k, 0)
-        return Form(self._times(left.numerator, right.numerator), {k: e for k, e in powers.items() if e})
+        return Form(self._ring.times(left.numerator, right.numerator), {k: e for k, e in powers.items() if e})
 
     def scale(self, a: Form, k: Fraction) -> Form:
         """k * a."""
-        return Form(a.numerator * self._flint.fmpq(k.numerator, k.denominator), a.powers) if k else self.constant(ZERO)
+        self.work.add(self._ring.reading(a.numerator))
+        return Form(a.numerator * self._ring.number(k), a.powers) if k else self.constant(ZERO)
 
     def reciprocal(self, a: Form, node: int | None = None) -> Form:
         """1 / a. `node` is the reciprocal in the graph, to be used again when the form is written out."""
         rest, powers = a.numerator, dict[int, int]()
+        self.work.require(self._ring.term * len(rest))
         monomial = [min(exponents) for exponents in zip(*rest.monoms(), strict=True)] if len(rest) else []
-        for generator, e in zip(self._generators, monomial, strict=False):
+        for generator, e in zip(self._ring.generators, monomial, strict=False):
             if e and len(rest) > 1:
                 k = self._factor(generator, None)
                 powers[k] = e
                 rest = rest / generator**e
         for k, known in enumerate(self.factors):
             while len(rest) > 1 or not rest.is_constant():
-                quotient = self._divided(rest, known)
+                quotient = self._ring.divided(rest, known)
                 if quotient is None:
                     break
                 rest, powers[k] = quotient, powers.get(k, 0) + 1
@@ -233,7 +196,7 @@ class Field:
         """a / b where the numerator of b divides a's exactly, else None: the result has no new poles."""
         if not b.numerator:
             return None
-        q = self._divided(self._times(a.numerator, self.product(b.powers)), b.numerator)
+        q = self._ring.divided(self._ring.times(a.numerator, self.product(b.powers)), b.numerator)
         return None if q is None else self._lowest(Form(q, a.powers))
 
     def affine(self, a: Form, b: Form) -> tuple[Fraction, Fraction] | None:
@@ -242,10 +205,14 @@ class Field:
             return None
         if a.powers or not b.numerator:
             return None
-        slope, rest = divmod(a.numerator, b.numerator)
-        if not (slope.is_constant() and rest.is_constant()):
-            return None
-        return _constant(slope), _constant(rest)
+        if a.numerator.is_constant():
+            alone = b.numerator.is_constant()
+            value = _constant(a.numerator)
+            return (value / _constant(b.numerator), ZERO) if alone else (ZERO, value)
+        self.work.require(self._ring.reading(a.numerator, b.numerator))
+        slope = a.numerator.leading_coefficient() / b.numerator.leading_coefficient()
+        rest = a.numerator - slope * b.numerator
+        return (_fraction(slope), _constant(rest)) if rest.is_constant() else None
 
     def express(self, form: Form, atoms: dict[int, int]) -> int:
         """Write a form as a node: quotient + rest * reciprocals. `atoms` maps atoms to nodes."""
@@ -258,7 +225,7 @@ class Field:
         for quotient, rest in self._divisions(form):
             over = g.mul(self._horner(rest, nodes), reciprocal)
             versions.append(g.add(self._horner(quotient, nodes), over))
-        return min(versions, key=lambda k: cost(g, [k]))
+        return min(versions, key=lambda k: cost(g, [k], self.work))
 
     def split(self, form: Form, values: dict[int, Fraction], atoms: dict[int, int]) -> tuple[int, int] | None:
         """Nodes q and rest with form = q + rest: q is the quotient where atoms of the denominator have these values.
@@ -267,16 +234,13 @@ class Field:
         """
         denominator = self.product(form.powers)
         inside = denominator.degrees()
-        fixed = {
-            f"a{self.position[a]}": self._flint.fmpq(v.numerator, v.denominator)
-            for a, v in values.items()
-            if inside[self.position[a]]
-        }
-        top, bottom = (p.subs(fixed) if fixed else p for p in (form.numerator, denominator))
-        quotient = divmod(top, bottom)[0] if bottom else bottom
+        fixed = {self.position[a]: self._ring.number(v) for a, v in values.items() if inside[self.position[a]]}
+        self.work.require(self._ring.reading(form.numerator, denominator))
+        top, bottom = (self._ring.at(p, fixed) for p in (form.numerator, denominator))
+        quotient = self._ring.division(top, bottom)[0] if bottom else bottom
         if not quotient:
             return None
-        rest = self._normal(form.numerator - self._times(quotient, denominator))
+        rest = self._ring.normal(form.numerator - self._ring.times(quotient, denominator))
         nodes = [atoms[a] for a in self.atoms]
         over = self.graph.mul(self._horner(rest, nodes), self._over(form.powers, nodes))
         return self._horner(quotient, nodes), over
@@ -295,7 +259,8 @@ class Field:
     def _divisions(self, form: Form) -> list[tuple[Polynomial, Polynomial]]:
         """Ways to write numerator = quotient * denominator + rest."""
         p, denominator = form.numerator, self.product(form.powers)
-        ways = [(p - p, p), divmod(p, denominator)]
+        ways = [(p - p, p), self._ring.division(p, denominator)]
+        self.work.require(self._ring.term * len(p))
         inner = [k for k, degree in enumerate(denominator.degrees()) if degree]
         groups: dict[tuple[int, ...], Any] = {}
         for monomial, coefficient in p.to_dict().items():
@@ -304,9 +269,9 @@ class Field:
         if len(groups) > 1:
             quotient, rest = p - p, p - p
             for outer, terms in groups.items():
-                monomial = self._ring.from_dict({outer: 1})
-                part = self._ring.from_dict(terms)
-                exact = self._divided(part, denominator)
+                monomial = self._ring.polynomial({outer: 1})
+                part = self._ring.polynomial(terms)
+                exact = self._ring.divided(part, denominator)
                 if exact is None:
                     rest += monomial * part
                 else:
@@ -315,11 +280,15 @@ class Field:
         return ways
 
     def _horner(self, p: Polynomial, nodes: list[int]) -> int:
-        terms = {tuple(map(int, m)): _fraction(c) for m, c in p.to_dict().items()}
         # The user's own form wins a tie: gains times small differences round better than expanded sums.
         choices = [node for known, node in self._named.get(len(p), ())[:SAME] if known == p]
-        choices.append(_nest(self.graph, terms, nodes))
-        return min(choices, key=lambda k: cost(self.graph, [k]))
+        if sum(p.degrees()) <= DEEPEST:
+            self.work.require(self._ring.term * len(p))
+            terms = {tuple(map(int, m)): _fraction(c) for m, c in p.to_dict().items()}
+            choices.append(_nest(self.graph, terms, nodes, self.work))
+        if not choices:
+            raise TooBig
+        return min(choices, key=lambda k: cost(self.graph, [k], self.work))
 
 
 def _fraction(c: Any) -> Fraction:
@@ -333,10 +302,11 @@ def _constant(p: Polynomial) -> Fraction:
 Terms = dict[tuple[int, ...], Fraction]
 
 
-def _nest(graph: Nodes, terms: Terms, nodes: list[int]) -> int:
+def _nest(graph: Nodes, terms: Terms, nodes: list[int], work: Work) -> int:
     """Greedy multivariate Horner scheme: the atom that occurs in most terms is taken out first."""
     if not terms:
         return graph.number(ZERO)
+    work.require(CALL + NEST * len(terms) * (6 + len(nodes)))
     if len(terms) > 1:
         counts = [sum(1 for m in terms if m[k]) for k in range(len(nodes))]
         best = max(range(len(nodes)), key=counts.__getitem__, default=0)
@@ -345,8 +315,8 @@ def _nest(graph: Nodes, terms: Terms, nodes: list[int]) -> int:
             e = min(m[best] for m in inside)
             outside = {m: c for m, c in terms.items() if not m[best]}
             reduced = {(*m[:best], m[best] - e, *m[best + 1 :]): c for m, c in inside.items()}
-            taken = graph.mul(graph.power(nodes[best], e), _nest(graph, reduced, nodes))
-            return graph.add(taken, _nest(graph, outside, nodes)) if outside else taken
+            taken = graph.mul(graph.power(nodes[best], e), _nest(graph, reduced, nodes, work))
+            return graph.add(taken, _nest(graph, outside, nodes, work)) if outside else taken
     total = graph.number(ZERO)
     for m, c in sorted(terms.items(), reverse=True):
         product = graph.number(ONE)
@@ -368,6 +338,8 @@ def combine(field_: Field, index: int, forms: dict[int, Form | None], node: int 
     left = forms[a]
     right = forms[b] if b >= 0 else left
     if left is None or right is None:
+        return None
+    if field_.work.over:
         return None
     try:
         if op in (ADD, SUB):
@@ -396,57 +368,3 @@ def square_root_argument(graph: Nodes, index: int) -> int | None:
     base, k = graph.coefficient(node.a)
     inner = graph.nodes[base]
     return inner.a if inner.op == LOG and k == Fraction(1, 2) else None
-
-
-def continuous_choice(gap: Expr, then: Expr, otherwise: Expr) -> Expr | None:
-    """`then` where gap > 0, else `otherwise`, as a continuous expression; None if that is not proved.
-
-    (then - otherwise) = q * gap on one side of gap = 0 gives otherwise + q max(gap, 0), or the mirror
-    image. On that side max(u, 0) is resolved for every u affine in the gap with a sign there.
-    """
-    graph = gap.graph
-    order = graph.reachable([gap.index, then.index, otherwise.index])
-    if len(order) > 400:
-        return None
-    ring = Field(graph, atoms_of(graph, order), reduce=False, deadline=time.monotonic() + 0.2)
-    for side in (1, -1):
-        forms = _one_sided(ring, order, gap.index, side)
-        a, b, c = forms[then.index], forms[otherwise.index], forms[gap.index]
-        if a is None or b is None or c is None:
-            return None
-        try:
-            q = ring.quotient(ring.add(a, b, -1), c)
-        except TooBig:
-            return None
-        if q is None:
-            continue
-        factor = ring.express(q, {k: k for k in ring.atoms})
-        kink = graph.relu(gap.index if side > 0 else graph.neg(gap.index))
-        base = otherwise if side > 0 else then
-        for index in (gap.index, then.index, otherwise.index):
-            graph.drop(index)
-        return type(gap)(graph, graph.add(base.index, graph.mul(factor, kink)))
-    return None
-
-
-def _one_sided(ring: Field, order: Sequence[int], gap: int, side: int) -> dict[int, Form | None]:
-    """Forms that hold where side * gap >= 0."""
-    graph = ring.graph
-    forms: dict[int, Form | None] = {}
-    inside_gap = set(graph.reachable([gap]))
-    for index in [*sorted(inside_gap), *(k for k in order if k not in inside_gap)]:
-        node = graph.nodes[index]
-        if node.op in RATIONAL:
-            forms[index] = combine(ring, index, forms)
-            continue
-        forms[index] = ring.atom(index)
-        argument, reference = forms.get(node.a), forms.get(gap)
-        if node.op == RELU and argument is not None and reference is not None:
-            line = ring.affine(argument, reference)
-            if line is not None:
-                slope, offset = line[0] * side, line[1]
-                if slope >= 0 and offset >= 0:
-                    forms[index] = argument
-                elif slope <= 0 and offset <= 0:
-                    forms[index] = ring.constant(ZERO)
-    return forms

@@ -7,7 +7,6 @@ is several times tighter, although it is no shorter.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -16,10 +15,11 @@ from numpy.typing import NDArray
 
 from modegraph.expression.evaluate import Evaluator
 from modegraph.expression.ops import RECIP
-from modegraph.expression.rational import TooBig, cost
+from modegraph.expression.rational import cost
 from modegraph.expression.scalar import Expr
 from modegraph.expression.simplify import Pass
 from modegraph.expression.tape import compile_tape
+from modegraph.expression.work import TooBig, Work
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ LONGEST = 3.0
 
 
 def residual(
-    exprs: Sequence[Expr], variables: Sequence[Expr], typical: Floats, constants: Sequence[Expr], *, seconds: float
+    exprs: Sequence[Expr], variables: Sequence[Expr], typical: Floats, constants: Sequence[Expr], *, work: float
 ) -> list[Expr]:
     """The expressions, fractions with a small rest written as quotient and rest: equal wherever they are defined.
 
@@ -41,8 +41,8 @@ def residual(
     constants : expressions
         Variables that are held at the middle of their typical values when the quotient is found, where the
         denominator depends on them.
-    seconds : float
-        Time after which the expressions stay as they are.
+    work : float
+        After so much of it (units of `Work`) the expressions stay as they are.
     """
     if not exprs:
         return []
@@ -50,7 +50,7 @@ def residual(
     order = graph.reachable([e.index for e in exprs])
     if not any(graph.nodes[k].op == RECIP for k in order):
         return list(exprs)
-    rational = Pass(graph, order, reduce=True, deadline=time.monotonic() + seconds)
+    rational = Pass(graph, order, reduce=True, work=Work(work))
     middle = {v.index: 0.5 * (row.min() + row.max()) for v, row in zip(variables, typical, strict=True)}
     known = {c.index for c in constants}
     values = {a: Fraction(float(middle[k])) for a, k in rational.atom_nodes.items() if k in known}
@@ -71,7 +71,7 @@ def _split(rational: Pass, e: Expr, values: dict[int, Fraction], variables: Sequ
     graph = e.graph
     rest = Expr(graph, parts[1])
     whole = graph.add(*parts)
-    if cost(graph, [whole]) > LONGEST * cost(graph, [e.index]):
+    if cost(graph, [whole], rational.work) > LONGEST * cost(graph, [e.index], rational.work):
         return e
     sizes = np.abs(Evaluator(compile_tape([e, rest], variables))(typical))
     if not np.isfinite(sizes).all() or sizes[1].sum() > SMALL * sizes[0].sum():

@@ -7,7 +7,6 @@ away with a cancelled term is handed back: a cancelled pole is still a pole.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -19,18 +18,23 @@ from modegraph.expression.rational import (
     RATIONAL,
     Field,
     Form,
-    TooBig,
     atoms_of,
     combine,
     cost,
     square_root_argument,
 )  # fmt: skip
 from modegraph.expression.scalar import Expr, Graph
+from modegraph.expression.work import TooBig, Work
 
 Kind = Literal["nonzero", "positive", "where"]
 
 SMALL = 60
 """Polynomials of up to this many terms are always written out for comparison."""
+
+WORK = 1e6
+"""Work of one simplification, in the units of `Work`."""
+EACH = 30.0
+"""Work of a node that is rebuilt."""
 
 
 @dataclass(frozen=True)
@@ -69,16 +73,17 @@ class Pass:
         What stands for each atom of ``field``.
     """
 
-    def __init__(self, graph: Graph, order: list[int], *, reduce: bool, deadline: float) -> None:
+    def __init__(self, graph: Graph, order: list[int], *, reduce: bool, work: Work) -> None:
         self._graph = graph
-        self._deadline = deadline
-        self.field = Field(graph, atoms_of(graph, order), reduce=reduce, deadline=deadline)
+        self.work = work
+        self.field = Field(graph, atoms_of(graph, order), reduce=reduce, work=work)
         self.forms: dict[int, Form | None] = {}
         self._by_node: dict[int, Form] = {}
         self.atom_nodes: dict[int, int] = {k: k for k in self.field.atoms}
         self._current: dict[int, int] = {}
         self._settled: dict[int, int] = {}
         for index in order:
+            work.add(EACH)
             if graph.nodes[index].op in RATIONAL:
                 self._rational(index)
             else:
@@ -145,8 +150,10 @@ class Pass:
             if sine in known and cosine in known:
                 self.field.relate(known[sine], Form(1 - known[cosine].numerator ** 2))
         argument = square_root_argument(self._graph, atom)
+        if argument is None:
+            return
         form = next((f for k, f in self.forms.items() if self._current[k] == argument), None)
-        if argument is not None and form is not None:
+        if form is not None:
             self.field.relate(known[atom], form)
 
     def settle(self, index: int) -> int:
@@ -157,43 +164,44 @@ class Pass:
 
     def _cheaper(self, index: int) -> int:
         current, form = self._current[index], self.forms[index]
-        if form is None or self._graph.nodes[index].op in LEAVES or time.monotonic() > self._deadline:
+        if form is None or self._graph.nodes[index].op in LEAVES or self.work.over:
             return current
-        own = cost(self._graph, [current])
+        own = cost(self._graph, [current], self.work)
         if len(form.numerator) > max(SMALL, 3 * own):
             return current
         try:
             written = self.field.express(form, self.atom_nodes)
         except TooBig:
             return current
-        return written if cost(self._graph, [written]) < own else current
+        return written if cost(self._graph, [written], self.work) < own else current
 
 
-def simplify(exprs: Sequence[Expr], *, seconds: float = 1.0) -> Simplified:
+def simplify(exprs: Sequence[Expr], *, work: float = WORK) -> Simplified:
     """Cheaper expressions with the same values, and the obligations that were dropped on the way.
 
     Parameters
     ----------
     exprs : expressions of one graph
-    seconds : time after which what was found is used and the rest stays as it is
+    work : after so much of it (units of `Work`) what was found is used and the rest stays as it is
 
     Raises `ModegraphError` where a denominator turns out to be identically zero.
     """
     if not exprs:
         return Simplified([])
     graph = exprs[0].graph
-    deadline = time.monotonic() + seconds
+    budget = Work(work)
     roots = [e.index for e in exprs]
     forgotten = list(graph.dropped)
     order = graph.reachable(roots + forgotten)
     passes = []
-    for reduce in (False, True) if _has_relations(graph, order) else (False,):
-        limit = deadline if reduce else time.monotonic() + seconds * (0.6 if _has_relations(graph, order) else 1.0)
-        passes.append(Pass(graph, order, reduce=reduce, deadline=limit))
+    related = _has_relations(graph, order)
+    for reduce in (False, True) if related else (False,):
+        share = budget.share(0.6 if related and not reduce else 1.0)
+        passes.append(Pass(graph, order, reduce=reduce, work=share))
     candidates = [roots] + [[p.settle(k) for k in roots] for p in passes]
-    chosen = _cheapest(graph, candidates)
+    chosen = _cheapest(graph, candidates, budget)
     result = Simplified([Expr(graph, k) for k in chosen])
-    _obligations(graph, order, passes, chosen, result)
+    _obligations(graph, order, passes, chosen, result, budget)
     del graph.dropped[len(forgotten) :]
     return result
 
@@ -208,20 +216,22 @@ def _has_relations(graph: Graph, order: list[int]) -> bool:
     return False
 
 
-def _cheapest(graph: Graph, candidates: list[list[int]]) -> list[int]:
+def _cheapest(graph: Graph, candidates: list[list[int]], work: Work) -> list[int]:
     """Choose a version of each root so that they are cheap together."""
-    best = min(candidates, key=lambda roots: cost(graph, roots))
-    value = cost(graph, best)
+    best = min(candidates, key=lambda roots: cost(graph, roots, work))
+    value = cost(graph, best, work)
     for k, other in product(range(len(best)), candidates):
-        if other[k] != best[k]:
+        if other[k] != best[k] and not work.over:
             trial = [*best[:k], other[k], *best[k + 1 :]]
-            trial_value = cost(graph, trial)
+            trial_value = cost(graph, trial, work)
             if trial_value < value:
                 best, value = trial, trial_value
     return best
 
 
-def _obligations(graph: Graph, order: list[int], passes: list[Pass], chosen: list[int], result: Simplified) -> None:
+def _obligations(
+    graph: Graph, order: list[int], passes: list[Pass], chosen: list[int], result: Simplified, work: Work
+) -> None:
     """Fill in what the originals needed to be defined and the result does not mention."""
     kept = set(graph.reachable(chosen))
     seen: set[tuple[Kind, int]] = set()
@@ -233,7 +243,8 @@ def _obligations(graph: Graph, order: list[int], passes: list[Pass], chosen: lis
             kind, argument = "nonzero" if node.op == RECIP else "positive", node.a
         else:
             continue
-        _obligation(graph, index, kind, [argument, *(p.settle(argument) for p in passes)], kept, seen, result)  # type: ignore[arg-type]
+        versions = [argument, *(p.settle(argument) for p in passes)]
+        _obligation(graph, index, kind, versions, kept, seen, result, work)  # type: ignore[arg-type]
 
 
 def _obligation(
@@ -244,11 +255,12 @@ def _obligation(
     kept: set[int],
     seen: set[tuple[Kind, int]],
     result: Simplified,
+    work: Work,
 ) -> None:
     if index in kept:
         return
     if kind == "where":
-        argument = min(versions, key=lambda k: cost(graph, [k]))
+        argument = _shortest(graph, versions, work)
         if graph.value(argument) is None and (kind, argument) not in seen:
             seen.add((kind, argument))
             result.dropped.append(Expr(graph, argument))
@@ -263,8 +275,13 @@ def _obligation(
         if guard in kept or (kind, guard) in seen or graph.value(guard) is not None:
             return
         guards[version] = guard
-    argument = min(guards, key=lambda k: cost(graph, [k]))
+    argument = _shortest(graph, list(guards), work)
     seen.add((kind, guards[argument]))
     result.dropped.append(Expr(graph, argument))
     result.kinds.append(kind)
     result.guards.append(Expr(graph, guards[argument]))
+
+
+def _shortest(graph: Graph, versions: list[int], work: Work) -> int:
+    """The version that costs least; the first, where no work is left to compare them."""
+    return versions[0] if work.over else min(versions, key=lambda k: cost(graph, [k], work))

@@ -16,10 +16,10 @@ from modegraph.model.target import Target
 from modegraph.model.trajectory import Trajectory, trajectory
 
 
-def with_horizon(mode: Mode, seconds: float | None) -> Mode:
+def with_horizon(mode: Mode, horizon: float | None) -> Mode:
     """The mode with a horizon of its own (None: that of ``build``)."""
     changed = copy(mode)
-    changed.horizon = seconds
+    changed.horizon = horizon
     return changed
 
 

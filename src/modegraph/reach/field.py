@@ -20,8 +20,8 @@ from modegraph.model.closed_loop import ClosedLoop, Segment
 from modegraph.model.sets.box import Box
 from modegraph.model.sets.exact import inverse, matrix
 
-SIMPLIFY_SECONDS = 1.0
-"""Longest time spent on cancelling terms of one closed loop; then the tape is used as written."""
+SIMPLIFY_WORK = 1e6
+"""Work spent on cancelling terms of one closed loop; then the tape is used as written. It is counted, not timed."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,8 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
         zero = graph.constant(0).index
         at_zero = graph.rewrite([e.index for e in written], known={w.index: zero for w in disturbance})
         parts = [Expr(graph, k) for k in at_zero] + [e for row in by_w for e in row]
-        parts = simplify(parts, seconds=SIMPLIFY_SECONDS).exprs
-        parts[:n] = residual(parts[:n], variables, loop.typical, unknowns, seconds=SIMPLIFY_SECONDS)
+        parts = simplify(parts, work=SIMPLIFY_WORK).exprs
+        parts[:n] = residual(parts[:n], variables, loop.typical, unknowns, work=SIMPLIFY_WORK)
         rates = []
         for i in range(n):
             rate = parts[i]
@@ -193,8 +193,8 @@ def compile_field(loop: ClosedLoop, segment: Segment, frame: Frame | None = None
             rates.append(rate)
         by_w = [parts[n + i * nw : n + (i + 1) * nw] for i in range(n)]
     else:
-        rates = simplify(written, seconds=SIMPLIFY_SECONDS).exprs
-        rates = residual(rates, variables, loop.typical, unknowns, seconds=SIMPLIFY_SECONDS)
+        rates = simplify(written, work=SIMPLIFY_WORK).exprs
+        rates = residual(rates, variables, loop.typical, unknowns, work=SIMPLIFY_WORK)
         by_w = derivative(rates, disturbance) if nw else by_w
     obligations += _obligations(graph, [*graph.dropped, *(e.index for e in rates)])
     unique = [Expr(graph, k) for k in dict.fromkeys(obligations)]
