@@ -1,0 +1,81 @@
+"""A switch in zero time between classes of references: S_i(p) inside S_j(q), exactly.
+
+A pair counts where the inclusion holds for both start sets of each reference, the formula in exact numbers and
+the set in floats that a run enters (as `is_subset` decides it for single references). Where numbers have no
+exact values, an inequality with all roundings decides, or nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modegraph.certify.switching.fit import Fit, Never, fit_of
+from modegraph.certify.switching.start_family import StartFamily, start_family
+from modegraph.certify.unit import TargetSpec
+from modegraph.errors import ModegraphError
+from modegraph.model.mode import Mode
+from modegraph.model.sets import Polytope, is_subset
+from modegraph.model.sets.rational import rational_subset
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ZeroTime:
+    """The pairs of references for which every start of the source is in the target at once.
+
+    It speaks of sets: that the constraints hold at t = 0 on all starts is for others to prove. The pair of a
+    reference with itself is like any other here.
+    """
+
+    source: StartFamily
+    target: StartFamily
+    fit: Fit
+
+    def decides(self, p: Floats, q: Floats) -> NDArray[np.bool_]:
+        """For p (B, ki) and q (B, kj): where S_i(p) is proved to be inside S_j(q)."""
+        known = self.source.covers(p) & self.target.covers(q)
+        with np.errstate(invalid="ignore"):
+            low, high = self.fit.excess((p, p), (q, q))
+        inside = known & (high <= 0.0)
+        for k in np.flatnonzero(known & ~inside & ~(low > 0.0)):
+            inside[k] = self._exactly(p[k], q[k])
+        return np.asarray(inside)
+
+    def _exactly(self, p: Floats, q: Floats) -> bool:
+        inner, outer = self.source.exact(p), self.target.exact(q)
+        if inner is None or outer is None or not rational_subset(inner, outer):
+            return False
+        try:
+            return is_subset(self.source.own(p), self.target.own(q))
+        except ModegraphError:
+            return False
+
+    def boxes(self, source: tuple[Floats, Floats], target: tuple[Floats, Floats]) -> NDArray[np.bool_]:
+        """Which products of boxes lo, hi (B, ki) x (B, kj) are inside as a whole."""
+        known = self.source.covers(source[0]) & self.source.covers(source[1])
+        known &= self.target.covers(target[0]) & self.target.covers(target[1])
+        return np.asarray(known & (self.fit.excess(source, target)[1] <= 0.0))
+
+    def excludes(self, source: tuple[Floats, Floats], target: tuple[Floats, Floats]) -> NDArray[np.bool_]:
+        """Which products of boxes hold no pair that is inside."""
+        return np.asarray(self.fit.excess(source, target)[0] > 0.0)
+
+    def gauges(self, p: Floats, q: Floats) -> Floats:
+        """Gauges (B,), at most 1, of pairs that are inside."""
+        return np.asarray(np.clip(self.fit.gauges(p, q), 0.0, 1.0))
+
+
+def zero_time(mode: Mode, p: Floats | None, spec: TargetSpec) -> ZeroTime | None:
+    """From a mode - under the reference p, or p = None for its whole class - to a target; None where no pair
+    is inside, or nothing is known of that."""
+    try:
+        source, target = start_family(mode, p), start_family(spec.mode, spec.p)
+        if source is None or target is None or source.dim != target.dim or source.shape.kind is Polytope:
+            return None
+        return ZeroTime(source, target, fit_of(source, target))
+    except (ModegraphError, Never):
+        return None
