@@ -14,6 +14,7 @@ from modegraph.certify.proof import SafetyProof, certified_check, least_slack
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.common_time import proved_instants
+from modegraph.certify.switching.zero_time import zero_time
 from modegraph.certify.targets.family import TargetClass, target_class
 from modegraph.certify.unit import TargetSpec
 from modegraph.certify.verdict import Floats, Status, Verdict
@@ -83,6 +84,11 @@ def relate(
         links.refine(deadline, progress)
     known = iter(links.relations)
     relations = [goal if isinstance(goal, str) else next(known) for goal in goals]
+    if compiled.start.dim == compiled.plant and all(proved_until(chain) >= 0.0 for chain in links.chains):
+        relations = [
+            replace(relation, zero=zero_time(mode, p, spec)) if isinstance(relation, Relation) else relation
+            for relation, spec in zip(relations, targets, strict=True)
+        ]
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
     return ClassResult(relations, _check(compiled, links.chains), slack, end)
 

@@ -105,7 +105,8 @@ class Functions:
     def __init__(self, exprs: list[Expr], parameters: list[Expr]) -> None:
         self.count = len(exprs)
         slopes = derivative(exprs, parameters)
-        self._line: tuple[Floats, Floats] | None = None
+        self.line: tuple[Floats, Floats] | None = None
+        """Offsets (count,) and rates (count, k), nearest doubles, where all functions are affine."""
         zero = [Fraction(0)] * len(parameters)
         if all(e.is_constant for row in slopes for e in row):
             try:
@@ -114,19 +115,19 @@ class Functions:
                 offsets = [None]
             if all(v is not None for v in offsets):
                 rates = [[float(e.value) for e in row] for row in slopes]
-                self._line = (
+                self.line = (
                     np.array([float(v) for v in offsets if v is not None]),
                     np.array(rates).reshape(self.count, len(parameters)),
                 )
-        self._evaluate = None if self._line else IntervalEvaluator(compile_tape(exprs, parameters))
+        self._evaluate = None if self.line else IntervalEvaluator(compile_tape(exprs, parameters))
 
     def ranges(self, lo: Floats, hi: Floats) -> tuple[Floats, Floats]:
         """(B, count) from below and from above, over boxes (B, k)."""
-        if self._line is None:
+        if self.line is None:
             assert self._evaluate is not None
             low, high, _ = self._evaluate(np.ascontiguousarray(lo.T), np.ascontiguousarray(hi.T))
             return low.T, high.T
-        offset, rates = self._line
+        offset, rates = self.line
         # Numbers rounded to doubles, a product and a sum of k + 1 terms: gamma(k + 4) of their sizes.
         size = np.abs(offset) + np.maximum(np.abs(lo), np.abs(hi)) @ self._sizes.T
         error = 2.0 * (rates.shape[1] + 4) * UNIT * size + TINY
@@ -138,13 +139,13 @@ class Functions:
 
     @cached_property
     def _sizes(self) -> Floats:
-        assert self._line is not None
-        return np.abs(self._line[1])
+        assert self.line is not None
+        return np.abs(self.line[1])
 
     @cached_property
     def _signed(self) -> tuple[Floats, Floats]:
-        assert self._line is not None
-        return np.maximum(self._line[1], 0.0), np.minimum(self._line[1], 0.0)
+        assert self.line is not None
+        return np.maximum(self.line[1], 0.0), np.minimum(self.line[1], 0.0)
 
 
 def start_family(mode: Mode | Target, p: Floats | None) -> StartFamily | None:

@@ -16,8 +16,9 @@ from modegraph.certify.switching.fit import Fit, Never, fit_of
 from modegraph.certify.switching.start_family import StartFamily, start_family
 from modegraph.certify.unit import TargetSpec
 from modegraph.errors import ModegraphError
+from modegraph.expression.derivative import derivative
 from modegraph.model.mode import Mode
-from modegraph.model.sets import Polytope, is_subset
+from modegraph.model.sets import Polytope, exact, is_subset
 from modegraph.model.sets.rational import rational_subset
 
 Floats = NDArray[np.float64]
@@ -37,11 +38,13 @@ class ZeroTime:
 
     def decides(self, p: Floats, q: Floats) -> NDArray[np.bool_]:
         """For p (B, ki) and q (B, kj): where S_i(p) is proved to be inside S_j(q)."""
-        known = self.source.covers(p) & self.target.covers(q)
-        with np.errstate(invalid="ignore"):
-            low, high = self.fit.excess((p, p), (q, q))
-        inside = known & (high <= 0.0)
-        for k in np.flatnonzero(known & ~inside & ~(low > 0.0)):
+        low, high = self.fit.excess_of_pairs(p, q)
+        possible: NDArray[np.bool_] = ~(low > 0.0)
+        if not possible.any():
+            return possible
+        possible &= self.source.covers(p) & self.target.covers(q)
+        inside = possible & (high <= 0.0)
+        for k in np.flatnonzero(possible & ~inside):
             inside[k] = self._exactly(p[k], q[k])
         return np.asarray(inside)
 
@@ -76,6 +79,19 @@ def zero_time(mode: Mode, p: Floats | None, spec: TargetSpec) -> ZeroTime | None
         source, target = start_family(mode, p), start_family(spec.mode, spec.p)
         if source is None or target is None or source.dim != target.dim or source.shape.kind is Polytope:
             return None
+        if spec.mode is mode and _only_itself(source):
+            return None
         return ZeroTime(source, target, fit_of(source, target))
     except (ModegraphError, Never):
         return None
+
+
+def _only_itself(family: StartFamily) -> bool:
+    """Equal sets around centres that differ from reference to reference: none is inside another."""
+    entries = [e for row in family.shape.axes for e in row]
+    slopes = derivative(family.shape.centre, family.parameters)
+    if not family.parameters or not all(e.is_constant for e in [*entries, *(e for row in slopes for e in row)]):
+        return False
+    rows = [[e.value for e in row] for row in slopes]
+    gram = [[exact.dot(a, b) for b in zip(*rows, strict=True)] for a in zip(*rows, strict=True)]
+    return exact.is_positive_definite(gram)

@@ -89,9 +89,7 @@ def in_quadric(inner: Set, center: exact.Row, weight: exact.Matrix) -> bool:
     return corners is not None and all(exact.quadratic_form(weight, _minus(corner, center)) <= 1 for corner in corners)
 
 
-def generators_in_quadric(
-    middle: exact.Row, generators: exact.Matrix, center: exact.Row, weight: exact.Matrix
-) -> bool:
+def generators_in_quadric(middle: exact.Row, generators: exact.Matrix, center: exact.Row, weight: exact.Matrix) -> bool:
     """Sufficient: bound the square of offset + sum g_k z_k term by term (exact for orthogonal generators)."""
     offset = _minus(middle, center)
     weighted = [exact.times(weight, g) for g in generators]
