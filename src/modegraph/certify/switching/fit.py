@@ -19,7 +19,7 @@ from modegraph.certify.targets.region import Region
 from modegraph.enclosure.inclusions import distances, excesses
 from modegraph.enclosure.rounding import TINY, UNIT
 from modegraph.expression.scalar import Expr
-from modegraph.model.sets import Ball, Box, Ellipsoid, Polytope, Zonotope, exact
+from modegraph.model.sets import Box, Polytope, Zonotope, exact
 
 Floats = NDArray[np.float64]
 Boxes = tuple[Floats, Floats]
@@ -73,8 +73,7 @@ class FlatFit:
         for face in _faces(target):
             low, high = _support(source, face.direction)
             used = [k for k, v in enumerate(face.direction) if v]
-            ball = source.shape.kind is Ball and source.shape.round
-            numbers = source.plain[used].all() and face.plain and (not ball or source.plain.all())
+            numbers = face.plain and source.plain[used].all()
             if numbers and high.value <= face.bound.value:
                 share = (high.value - face.bound.value) / face.limit.value if face.limit.value > 0 else Fraction(0)
                 settled = max(settled, 1.0 + exact.round_up(share))
@@ -218,16 +217,22 @@ class RoundFit:
             self.T, self.grow, limit = region.T, region.grow, target.graph.constant(1)
         self.off = 2.0 * (source.allowance + target.allowance)
         self.limit_off = 2.0 * float(target.allowance.max()) if target.shape.ellipsoid is None else 0.0
-        self.columns = [] if shape.round else [
-            k for k in range(len(shape.axes[0])) if not all(row[k].is_constant and row[k].value == 0 for row in shape.axes)
-        ]  # fmt: skip
+        columns = [] if shape.round else list(zip(*shape.axes, strict=True))
+        self.columns = [k for k, g in enumerate(columns) if not all(e.is_constant and e.value == 0 for e in g)]
         sizes = [shape.axes[0][0]] if shape.round and shape.ellipsoid is None else []
         own = sizes or [row[k] for row in shape.axes for k in self.columns]
         self._source: Functions = source.functions([*shape.centre, *own])
         self._target: Functions = target.functions([*target.shape.centre, limit])
         self.round, self.sized = shape.round, bool(sizes)
-        shape_of = np.eye(n) if shape.ellipsoid is None else np.array(shape.ellipsoid.shape, float)
-        self.values, self.vectors = np.linalg.eigh(self.T @ shape_of @ self.T.T)
+        self._lines = [
+            None if f.line is None else (f.line[0][:n].copy(), f.line[1][:n].copy())
+            for f in (self._source, self._target)
+        ]
+        own_shape = np.eye(n) if shape.ellipsoid is None else np.array(shape.ellipsoid.shape, float)
+        self.values, self.vectors = np.linalg.eigh(self.T @ own_shape @ self.T.T)
+        # The product is off by gamma(2 n) |T||shape||T'|, its eigenvalues by a few units of the largest.
+        product = np.abs(self.T) @ np.abs(own_shape) @ np.abs(self.T.T)
+        self.blur = 8.0 * n * UNIT * float(product.sum(axis=1).max())
         self._largest = np.inf
         self._refuse_sizes(source, target)
 
@@ -258,13 +263,14 @@ class RoundFit:
             axes = np.einsum("ij,bjm->bim", self.T, table)
         lost = (lost + 8.0 * (n + 4) * UNIT * size) @ np.abs(self.T).T
         if self.sized:
-            lost = lost + radius[:, n:] * np.sqrt(np.maximum(self.values[-1], 0.0)) * (1.0 + ROUNDED)
-        return (middle[:, :n] - centre) @ self.T.T, np.sqrt((lost**2).sum(axis=1)) * (1.0 + ROUNDED), axes
+            lost = lost + radius[:, n:] * np.sqrt(self.values[-1] + self.blur) * (1.0 + ROUNDED)
+        return (middle[:, :n] - centre) @ self.T.T, lengths(lost) * (1.0 + ROUNDED) + TINY, axes
 
     def _farthest(self, y: Floats, lost: Floats, axes: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Bounds (B,) of the largest |y + z| over what the source adds."""
         if self.round:
-            found = farthest_of_ellipsoid(y @ self.vectors, self.values, size[:, 0] if self.sized else np.ones(len(y)))
+            radius = size[:, 0] if self.sized else np.ones(len(y))
+            found = farthest_of_ellipsoid(y @ self.vectors, self.values, self.blur, radius)
         else:
             found = farthest_corner(y, axes)
         return found[0] * (1.0 - ROUNDED) - lost, found[1] * (1.0 + ROUNDED) + lost
@@ -282,14 +288,10 @@ class RoundFit:
         return least - large * self.grow * (1.0 + ROUNDED), most * self.grow - small * (1.0 - ROUNDED)
 
     def excess_of_pairs(self, source: Floats, target: Floats) -> tuple[Floats, Floats]:
-        line, other = self._source.line, self._target.line
+        line, other = self._lines
         if line is None or other is None:
             return self.excess((source, source), (target, target))
-        n = self.T.shape[0]
-        apart = distances(
-            np.ascontiguousarray(source), np.ascontiguousarray(target),
-            line[0][:n], line[1][:n], other[0][:n], other[1][:n], self.T, self.off,
-        )  # fmt: skip
+        apart = distances(np.ascontiguousarray(source), np.ascontiguousarray(target), *line, *other, self.T, self.off)
         # A set whose centre is outside is not inside.
         low = apart - self._largest
         left = np.flatnonzero(~(low > 0.0))
@@ -304,53 +306,59 @@ class RoundFit:
             return np.asarray(np.where(small > 0.0, most * self.grow * (1.0 + ROUNDED) / small, np.inf))
 
 
+def lengths(y: Floats) -> Floats:
+    """Euclidean lengths along the last axis, also where squares would underflow."""
+    unit = np.maximum(np.abs(y).max(axis=-1, initial=0.0), np.finfo(float).tiny)
+    return np.asarray(unit * np.sqrt(((y / unit[..., None]) ** 2).sum(axis=-1)))
+
+
 def farthest_corner(y: Floats, axes: Floats) -> tuple[Floats, Floats]:
     """Bounds (B,) of the largest |y + axes z| over |z_k| <= 1, but for roundings; y (B, n), axes (B, n, m)."""
     m = axes.shape[2]
     alone = (np.count_nonzero(axes, axis=2) <= 1).all() and (np.count_nonzero(axes, axis=1) <= 1).all()
-    above = np.sqrt(((np.abs(y) + np.abs(axes).sum(axis=2)) ** 2).sum(axis=1))
+    above = lengths(np.abs(y) + np.abs(axes).sum(axis=2))
     if alone:
         return above, above
     if 2**m <= MOST_CORNERS:
         signs = np.array(list(itertools.product((1.0, -1.0), repeat=m)))
         step = max(1, CHUNK // (len(signs) * y.shape[1]))
         parts = [
-            np.sqrt(((y[k : k + step, None] + np.einsum("bnm,sm->bsn", axes[k : k + step], signs)) ** 2).sum(axis=2))
-            .max(axis=1)
+            lengths(y[k : k + step, None] + np.einsum("bnm,sm->bsn", axes[k : k + step], signs)).max(axis=1)
             for k in range(0, len(y), step)
-        ]  # fmt: skip
+        ]
         found = np.concatenate(parts) if parts else np.zeros(0)
         return found, found
     ahead = np.where(np.einsum("bn,bnm->bm", y, axes) >= 0.0, 1.0, -1.0)
-    return np.sqrt(((y + np.einsum("bnm,bm->bn", axes, ahead)) ** 2).sum(axis=1)), above
+    return lengths(y + np.einsum("bnm,bm->bn", axes, ahead)), above
 
 
-def farthest_of_ellipsoid(y: Floats, values: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Bounds (B,) of the largest |y + size z| over z'diag(values)^-1 z <= 1, but for roundings; y (B, n).
+def farthest_of_ellipsoid(y: Floats, values: Floats, blur: float, size: Floats) -> tuple[Floats, Floats]:
+    """Bounds (B,) of the largest |y + size z| over z'diag(v)^-1 z <= 1, v within blur of values; y (B, n).
 
-    From above by any l > max m, m = size^2 values: |y + z|^2 <= l + sum l y_k^2 / (l - m_k); its least value is the
+    From above by any l > max m, m = size^2 v: |y + z|^2 <= l + sum l y_k^2 / (l - m_k); its least value is the
     answer, and z = m y / (l - m) there.
     """
-    top = float(values[-1])
-    blur = 1e-13 * max(top, 0.0)
-    m = np.maximum(values + blur, 0.0) * size[:, None] ** 2
-    pull = (m * y**2).sum(axis=1)
-    low, high = m.max(axis=1), m.max(axis=1) + np.sqrt(pull)
-    length = np.sqrt((y**2).sum(axis=1))
-    if float(values[0]) >= top * (1.0 - 1e-13):
-        inner = np.sqrt(max(float(values[0]) - blur, 0.0)) * size
-        return length + inner, length + np.sqrt(m.max(axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    small, large = np.maximum(values - blur, 0.0), values + blur
+    length = lengths(y)
+    simple = length + np.sqrt(large[-1]) * size
+    least = np.maximum(length + np.sqrt(small[0]) * size, np.sqrt(small[-1]) * size)
+    if not values[-1] > values[0] + 4.0 * blur:
+        return least, simple
+    # In units of the answer: squares of tiny numbers would be 0.
+    unit = np.maximum(simple, np.finfo(float).tiny)
+    y = y / unit[:, None]
+    less, m = (side * (size / unit)[:, None] ** 2 for side in (small, large))
+    low = m.max(axis=1)
+    high = low + np.sqrt((m * y**2).sum(axis=1))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             falls = (m * y**2 / (middle[:, None] - m) ** 2).sum(axis=1) > 1.0
             low, high = np.where(falls, middle, low), np.where(falls, high, middle)
         gap = high[:, None] - m
-        above = np.sqrt(high + np.where(y != 0.0, high[:, None] * y**2 / gap, 0.0).sum(axis=1))
-        less = np.maximum(values - blur, 0.0) * size[:, None] ** 2
+        above = unit * np.sqrt(high + np.where(y != 0.0, high[:, None] * y**2 / gap, 0.0).sum(axis=1))
         z = np.where(y != 0.0, less * y / gap, 0.0)
         own = np.sqrt(np.where(less > 0.0, z**2 / less, 0.0).sum(axis=1))
-        below = np.sqrt(((y + z / own[:, None]) ** 2).sum(axis=1))
-    above = np.where(np.isfinite(above), np.minimum(above, length + np.sqrt(m.max(axis=1))),
-                     length + np.sqrt(m.max(axis=1)))  # fmt: skip
-    return np.where(np.isfinite(below), below, np.maximum(length, np.sqrt(less.max(axis=1)))), above
+        below = unit * lengths(y + z / own[:, None])
+    below = np.where(np.isfinite(below), np.maximum(below, least), least)
+    return below, np.where(np.isfinite(above), np.minimum(above, simple), simple)
