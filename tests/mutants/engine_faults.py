@@ -36,6 +36,13 @@ ENGINE_FAULTS = (
         (ZERO_TIME,),
     ),
     Fault(
+        "the spread of a tiny set is 0 where its squares are",
+        "certify/moments.py",
+        "        exponent = np.frexp(size)[1]\n",
+        "        exponent = np.zeros(len(size), np.int64)\n",
+        ("tests/traps/test_class_scales.py",),
+    ),
+    Fault(
         "squares of tiny lengths are 0",
         "certify/switching/fit.py",
         "    unit = np.maximum(np.abs(y).max(axis=-1, initial=0.0), np.finfo(float).tiny)\n",

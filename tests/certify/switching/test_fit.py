@@ -59,6 +59,13 @@ def test_single_pairs_are_boxes_without_width(outer: Any) -> None:
     assert (high <= 0.0).any()
 
 
+def test_no_pairs_have_no_answers() -> None:
+    fit = fit_of(family(lambda r: mg.Box(r - 0.5, r + 0.5)), family(lambda r: mg.Ball(r, 1.0)))
+    nothing = np.zeros((0, 2))
+    assert len(fit.gauges(nothing, nothing)) == 0
+    assert len(fit.excess_of_pairs(nothing, nothing)[0]) == 0
+
+
 def test_bounds_of_the_farthest_point_of_an_ellipsoid() -> None:
     rng = np.random.default_rng(2)
     values = np.array([0.01, 0.3, 2.0])

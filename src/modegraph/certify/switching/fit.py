@@ -257,7 +257,7 @@ class RoundFit:
         size = np.abs(middle[:, :n]) + np.abs(centre)
         axes = np.zeros((len(low), n, 0))
         if self.columns:
-            table = middle[:, n:].reshape(len(low), n, -1)
+            table = middle[:, n:].reshape(len(low), n, len(self.columns))
             lost = lost + radius[:, n:].reshape(table.shape).sum(axis=2)
             size = size + np.abs(table).sum(axis=2)
             axes = np.einsum("ij,bjm->bim", self.T, table)
