@@ -120,7 +120,9 @@ def test_a_set_inside_another_whose_constraint_is_broken_at_the_start(limit: flo
     graph = mg.build([bounded, mode("wide", 0.25)], horizon=1.0)
     wanted = mg.Status.CERTIFIED if limit == 0.5 else mg.Status.UNDECIDED
     assert graph.verdict("bounded", "wide").status is wanted
-    assert graph.references("bounded", "wide").contains([0.0], [0.125]) == (limit == 0.5)
+    refs = graph.references("bounded", "wide")
+    assert refs.contains([0.0], [0.125]) == (limit == 0.5)
+    assert bool(refs.cells) == (limit == 0.5)
 
 
 @pytest.mark.parametrize("further", [False, True])

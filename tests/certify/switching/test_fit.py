@@ -59,8 +59,9 @@ def test_single_pairs_are_boxes_without_width(outer: Any) -> None:
     assert (high <= 0.0).any()
 
 
-def test_no_pairs_have_no_answers() -> None:
-    fit = fit_of(family(lambda r: mg.Box(r - 0.5, r + 0.5)), family(lambda r: mg.Ball(r, 1.0)))
+@pytest.mark.parametrize("outer", [lambda r: mg.Ball(r, 1.0), lambda r: mg.Ball([np.sin(r[0]), r[1]], 1.0)])
+def test_no_pairs_have_no_answers(outer: Any) -> None:
+    fit = fit_of(family(lambda r: mg.Box(r - 0.5, r + 0.5)), family(outer))
     nothing = np.zeros((0, 2))
     assert len(fit.gauges(nothing, nothing)) == 0
     assert len(fit.excess_of_pairs(nothing, nothing)[0]) == 0

@@ -125,6 +125,8 @@ class Functions:
         """(B, count) from below and from above, over boxes (B, k)."""
         if self.line is None:
             assert self._evaluate is not None
+            if not len(lo):
+                return np.zeros((0, self.count)), np.zeros((0, self.count))
             low, high, _ = self._evaluate(np.ascontiguousarray(lo.T), np.ascontiguousarray(hi.T))
             return low.T, high.T
         offset, rates = self.line

@@ -82,7 +82,7 @@ def zero_time(mode: Mode, p: Floats | None, spec: TargetSpec) -> ZeroTime | None
         if spec.mode is mode and _only_itself(source):
             return None
         return ZeroTime(source, target, fit_of(source, target))
-    except (ModegraphError, Never):
+    except (ModegraphError, OverflowError, Never):
         return None
 
 
