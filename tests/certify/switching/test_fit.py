@@ -27,7 +27,7 @@ def family(start: Any) -> Any:
 
 
 def test_lengths_of_tiny_vectors() -> None:
-    assert lengths(np.array([[3e-200, 4e-200], [0.0, 0.0]])) == pytest.approx([5e-200, 0.0], rel=1e-15)
+    assert lengths(np.array([[3e-200, 4e-200], [0.0, 0.0]])) == pytest.approx([5e-200, 0.0], rel=1e-15, abs=0.0)
 
 
 @pytest.mark.parametrize(
