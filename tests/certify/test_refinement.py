@@ -7,7 +7,7 @@ import numpy as np
 import modegraph as mg
 from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
-from modegraph.certify.unit import TargetSpec
+from modegraph.certify.targets.spec import TargetSpec
 from modegraph.deadline import Deadline
 
 

@@ -27,7 +27,7 @@ from modegraph.reach.compiled import compile_mode
 
 digest = hashlib.sha256()
 for mode in runpy.run_path(sys.argv[1])["modes"]:
-    for field in compile_mode(mode, mode.reference.parameters()[0]).framed_fields():
+    for field in compile_mode(mode, mode.reference.parameters()[0]).framed_fields:
         for tape in (field.rates, field.jacobian):
             digest.update(tape.ops.tobytes() + tape.const.tobytes() + tape.outputs.tobytes())
             digest.update(repr(tape.labels).encode())

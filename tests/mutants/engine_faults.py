@@ -4,7 +4,58 @@ from __future__ import annotations
 
 from tests.mutants.fault import Fault
 
+ZERO_TIME = "tests/certify/switching/test_zero_time.py"
+
 ENGINE_FAULTS = (
+    Fault(
+        "a class switches in zero time though a constraint is broken at the start",
+        "certify/class_unit.py",
+        "all(proved_until(chain) >= 0.0 for chain in links.chains)",
+        "all(proved_until(chain) >= -1.0 for chain in links.chains)",
+        ("tests/traps/test_class_scales.py",),
+    ),
+    Fault(
+        "a set inside another in exact numbers is taken for the one in floats",
+        "certify/switching/zero_time.py",
+        "            return is_subset(self.source.own(p), self.target.own(q))\n",
+        "            return True\n",
+        (ZERO_TIME,),
+    ),
+    Fault(
+        "a set inside another in floats is taken for the one of the formula",
+        "certify/switching/zero_time.py",
+        "if inner is None or outer is None or not rational_subset(inner, outer):",
+        "if inner is None or outer is None:",
+        (ZERO_TIME,),
+    ),
+    Fault(
+        "zero time is claimed of references outside their class",
+        "certify/switching/zero_time.py",
+        "        possible &= self.source.covers(p) & self.target.covers(q)\n",
+        "",
+        (ZERO_TIME,),
+    ),
+    Fault(
+        "the spread of a tiny set is 0 where its squares are",
+        "certify/moments.py",
+        "        exponent = np.frexp(size)[1]\n",
+        "        exponent = np.zeros(len(size), np.int64)\n",
+        ("tests/traps/test_class_scales.py",),
+    ),
+    Fault(
+        "squares of tiny lengths are 0",
+        "certify/switching/fit.py",
+        "    unit = np.maximum(np.abs(y).max(axis=-1, initial=0.0), np.finfo(float).tiny)\n",
+        "    unit = np.ones(y.shape[:-1])\n",
+        ("tests/certify/switching/test_fit.py",),
+    ),
+    Fault(
+        "a constant that floats do not give is settled by the formula",
+        "certify/switching/fit.py",
+        "            numbers = face.plain and source.plain[used].all()\n",
+        "            numbers = low.is_constant and high.is_constant and face.bound.is_constant\n",
+        (ZERO_TIME,),
+    ),
     Fault(
         "the invariant set of a class stays where its middle is",
         "reach/tail/box.py",

@@ -13,6 +13,20 @@ EXPONENTIAL = "tests/enclosure/test_exponential.py"
 
 KERNEL_FAULTS = (
     Fault(
+        "an excess is rounded without allowance",
+        "enclosure/inclusions.py",
+        "            error = allowance[f] + ku * size + TINY\n",
+        "            error = allowance[f]\n",
+        ("tests/enclosure/test_inclusions.py",),
+    ),
+    Fault(
+        "a distance forgets what its centres may be off by",
+        "enclosure/inclusions.py",
+        "            lost[i] = allowance[i] + ku * size + TINY\n",
+        "            lost[i] = ku * size + TINY\n",
+        ("tests/enclosure/test_inclusions.py",),
+    ),
+    Fault(
         "a relation is the union over the parts of the starts",
         "enclosure/pairs.py",
         "            worst = max(worst, best)\n",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -83,3 +85,57 @@ def test_a_reference_without_an_axis() -> None:
         start=lambda r: mg.Ball(r, 0.1),
     )  # fmt: skip
     mode.find(np.array(0.1))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-150, 1e-165, 1e-200])
+@pytest.mark.parametrize("outside", [False, True])
+def test_sets_so_small_that_squares_underflow_are_inside_or_not_at_once(scale: float, outside: bool) -> None:
+    """Nothing moves, so a start is in the target at once or never. A ball of one radius around the reference, in a
+    ball of two: the centres are at most one radius apart, or a quarter of it more."""
+    still = mg.System(lambda x, u: 0.0 * u, states="x y", inputs="u v")
+
+    def mode(name: str, radius: float) -> mg.Mode:
+        return mg.Mode(
+            name, still, controller=lambda x, r: 0.0 * r, reference=mg.setpoint(Box([0.0] * 2, [4 * scale] * 2)),
+            start=lambda r: mg.Ball(r, scale * radius),
+        )  # fmt: skip
+
+    refs = mg.build([mode("a", 1.0), mode("b", 2.0)], horizon=0.1).references("a", "b")
+    distance = 1.25 * scale if outside else 0.75 * scale
+    assert refs.contains([0.0, 0.0], [0.6 * distance, 0.8 * distance]) == (not outside)
+
+
+@pytest.mark.parametrize("limit", [0.5, 0.25])
+def test_a_set_inside_another_whose_constraint_is_broken_at_the_start(limit: float) -> None:
+    """Every start of the one is in the other at t = 0, but some starts break |x| <= limit there already."""
+    region = Box([-0.25], [0.25])
+
+    def mode(name: str, radius: float, constraints: Any = None) -> mg.Mode:
+        return mg.Mode(
+            name, LINE, controller=lambda x, r: 0.0 * r, reference=mg.setpoint(region), constraints=constraints,
+            start=lambda r: Box(r - radius, r + radius),
+        )  # fmt: skip
+
+    bounded = mode("bounded", 0.125, lambda x: {"limit": abs(x[0]) <= limit})
+    graph = mg.build([bounded, mode("wide", 0.25)], horizon=1.0)
+    wanted = mg.Status.CERTIFIED if limit == 0.5 else mg.Status.UNDECIDED
+    assert graph.verdict("bounded", "wide").status is wanted
+    refs = graph.references("bounded", "wide")
+    assert refs.contains([0.0], [0.125]) == (limit == 0.5)
+    assert bool(refs.cells) == (limit == 0.5)
+
+
+@pytest.mark.parametrize("further", [False, True])
+def test_start_sets_that_touch_what_they_never_come_nearer_to(further: bool) -> None:
+    """x stays where it is: [r - 1/4, r + 1/4] is in [r' - 1/2, r' + 1/2] for |r - r'| <= 1/4, to the last unit."""
+    still = mg.System(lambda x, u: 0.0 * u, states="x", inputs="u")
+
+    def mode(name: str, radius: float) -> mg.Mode:
+        return mg.Mode(
+            name, still, controller=lambda x, r: 0.0 * r, reference=mg.setpoint(Box([-1.0], [1.0])),
+            start=lambda r: Box(r - radius, r + radius),
+        )  # fmt: skip
+
+    refs = mg.build([mode("a", 0.25), mode("b", 0.5)], horizon=1.0).references("a", "b")
+    distance = np.nextafter(0.25, 1.0) if further else 0.25
+    assert refs.contains([0.0], [distance]) == (not further)

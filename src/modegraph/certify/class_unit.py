@@ -24,8 +24,9 @@ from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.base import least_slack
+from modegraph.certify.switching.zero_time import zero_time
 from modegraph.certify.targets.family import TargetClass, target_class
-from modegraph.certify.unit import TargetSpec
+from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.verdict import Floats, Status, Verdict
 from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
@@ -90,7 +91,11 @@ def relate(
     known = iter(links.relations)
     # Of the constraints until the last instant that any of the relations uses.
     slack = least_slack(slack_until(flow, k) for chain in links.chains for flow, k in proved(chain))
-    relations = [goal if isinstance(goal, Reason) else replace(next(known), slack=slack) for goal in goals]
+    at_once = compiled.start.dim == compiled.plant and all(proved_until(chain) >= 0.0 for chain in links.chains)
+    relations: list[Relation | Reason] = []
+    for goal, spec in zip(goals, targets, strict=True):
+        zero = zero_time(mode, p, spec) if at_once and not isinstance(goal, Reason) else None
+        relations.append(goal if isinstance(goal, Reason) else replace(next(known), slack=slack, zero=zero))
     return ClassResult(relations, _check(compiled, links.chains))
 
 

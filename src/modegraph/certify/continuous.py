@@ -215,6 +215,11 @@ class ContinuousReferences:
         """Joint parameters (count, k) with small gauges (count,): certified ones where some are found."""
         lo, hi = self._bounds if within is None else within
         z = rng.uniform(lo, hi, (SEARCH, len(lo)))
+        if self.relations[key].zero is not None and 2 * self._split(z)[0].shape[1] == len(lo):
+            # Equal start sets in two classes are inside one another for equal references alone.
+            k = len(lo) // 2
+            z[: SEARCH // 8, k:] = np.clip(z[: SEARCH // 8, :k], lo[k:], hi[k:])
+            z[: SEARCH // 8, :k] = np.clip(z[: SEARCH // 8, k:], lo[:k], hi[:k])
         gauge = self._gauges(key, z)
         width = 0.5 * (hi - lo)
         for _ in range(ROUNDS):

@@ -60,6 +60,11 @@ def least(relation: Relation, source: tuple[Floats, Floats], target: tuple[Float
         gauge = np.maximum(gauge, best)
         for total, values in ((latest, np.concatenate(times)), (energy, np.concatenate(spent))):
             np.maximum(total, np.where(asked[:, None], np.where(some, values[first], np.inf), 0.0), out=total)
+    if relation.zero is not None:
+        rows, columns = np.indices(shape).reshape(2, -1)
+        boxes = (source[0][rows], source[1][rows]), (target[0][columns], target[1][columns])
+        at_once = ~relation.zero.excludes(*boxes).reshape(shape)
+        gauge, latest, energy = (np.where(at_once, np.minimum(v, 0.0), v) for v in (gauge, latest, energy))
     return Least(gauge, latest, energy)
 
 

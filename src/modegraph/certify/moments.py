@@ -143,7 +143,15 @@ def _spreads(flow: Flow, target: TargetClass, rest: Floats, G: Sequence[Floats])
     """(K, 1) gauges of a round target, or (K, f) reaches along the rows of a flat one, of m = 0."""
     if target.round:
         quadric = Quadric(np.zeros(target.dim), target.rows, target.grow)
-        return np.asarray(quadric.gauges(flow.bounds, rest, G))[:, None]
+        # Each set in a unit of its own, a power of two: the squares of tiny lengths would be 0.
+        size = [max(float(np.abs(p).max()), float(np.abs(g).max(initial=0.0))) for p, g in zip(rest, G, strict=True)]
+        exponent = np.frexp(size)[1]
+        scaled = quadric.gauges(
+            flow.bounds,
+            np.ldexp(rest, -exponent[:, None, None]),
+            [np.ldexp(g, -e) for g, e in zip(G, exponent, strict=True)],
+        )
+        return np.nextafter(np.ldexp(scaled, exponent), np.inf)[:, None]
     z = generator_sizes(target.rows, G)
     size = np.abs(rest).sum(axis=2) @ np.abs(target.rows).T + z
     return np.asarray(flow.bounds.upper(np.einsum("fi,kij->kfj", target.rows, rest)) + z + 64.0 * UNIT * size)

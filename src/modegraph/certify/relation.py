@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.moments import Moments
+from modegraph.certify.switching.zero_time import ZeroTime
 from modegraph.certify.targets.family import TargetClass
 from modegraph.enclosure.pairs import ROUNDED, first_crossings, part_gauges
 from modegraph.model.sets import Box
@@ -69,6 +70,8 @@ class Relation:
         that stays there for ever.
     slack : mapping
         Proved distance from each constraint, up to any instant of the parts.
+    zero : ZeroTime or None
+        Pairs certified at t = 0 whatever the parts prove; only where the constraints are proved there.
     """
 
     region: Box | None
@@ -76,6 +79,7 @@ class Relation:
     parts: tuple[Part, ...]
     rest: TargetClass | None
     slack: Mapping[str, float] = field(default_factory=dict)
+    zero: ZeroTime | None = None
 
     @property
     def source(self) -> int:
@@ -98,6 +102,8 @@ class Relation:
         """Whether what is certified does not depend on the source's reference, or not on the target's."""
         flows = [flow for part in self.parts for flow in part.flows]
         fixed = self.goal.affine is not None and not self.goal.affine[1].any()
+        if self.zero is not None:
+            return False, False
         return all(flow.is_constant for flow in flows), fixed
 
     @cached_property
@@ -138,6 +144,11 @@ class Relation:
         # The last row stands for a part that has no starts for a reference.
         known = np.where(instant == -2, len(table) - 1, instant)
         worst = np.where(found[:, None], table[known].max(axis=1), np.inf)
+        if self.zero is not None:
+            later = np.flatnonzero(worst[:, 0] > 0.0)
+            at_once = later[self.zero.decides(source[later], target[later])]
+            gauge[at_once] = np.minimum(gauge[at_once], self.zero.gauges(source[at_once], target[at_once]))
+            worst[at_once] = 0.0
         return Crossings(gauge, worst[:, 0], worst[:, 1])
 
     def worst(self, source: Floats, target: Floats) -> tuple[int, float]:
@@ -155,7 +166,11 @@ class Relation:
         """Which pairs are certified, as fast as can be."""
         if not self.parts:
             return np.zeros(len(source), bool)
-        return np.asarray(self._decided(source, target, True)[0] <= 1.0)
+        found = np.asarray(self._decided(source, target, True)[0] <= 1.0)
+        if self.zero is not None and not found.all():
+            left = np.flatnonzero(~found)
+            found[left] = self.zero.decides(source[left], target[left])
+        return found
 
     def _decided(self, source: Floats, target: Floats, quick: bool) -> tuple[Floats, NDArray[np.int64]]:
         found = first_crossings(
@@ -216,6 +231,14 @@ class Relation:
         self, lo: tuple[Floats, Floats], hi: tuple[Floats, Floats]
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which products of boxes (B, ki) x (B, kj) are certified, and which refuted, as a whole."""
+        certified, refuted = self._cells(lo, hi)
+        if self.zero is not None:
+            certified = certified | self.zero.boxes((lo[0], hi[0]), (lo[1], hi[1]))
+        return certified, refuted
+
+    def _cells(
+        self, lo: tuple[Floats, Floats], hi: tuple[Floats, Floats]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         straight = self.goal.affine is not None and (self.rest is None or self.rest.affine is not None)
         if not straight or not all(f.affine for part in self.parts for f in part.flows):
             return self._cells_by_ranges(lo, hi)

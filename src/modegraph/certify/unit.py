@@ -29,6 +29,7 @@ from modegraph.certify.question import Goal, Question
 from modegraph.certify.reason import Outcome, Reason, point
 from modegraph.certify.switching.zero_time import InZeroTime
 from modegraph.certify.targets.region import Region
+from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Witness
 from modegraph.deadline import Deadline
@@ -47,15 +48,6 @@ POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""
 LONGEST_RUN = 200.0
 """The same in seconds, for a mode without horizon."""
-
-
-@dataclass(frozen=True, eq=False)
-class TargetSpec:
-    """A target of a unit: a mode under the reference p, or a `Target`."""
-
-    name: str
-    p: Floats | None
-    mode: Mode | Target
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import time
 from dataclasses import dataclass, replace
 
 from modegraph.certify.references import Parameter
-from modegraph.certify.unit import TargetSpec, certify_unit
+from modegraph.certify.targets.spec import TargetSpec
+from modegraph.certify.unit import certify_unit
 from modegraph.certify.verdict import Verdict
 from modegraph.cores import one_core
 from modegraph.deadline import Deadline

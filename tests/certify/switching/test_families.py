@@ -11,7 +11,7 @@ import modegraph as mg
 from modegraph.certify.class_unit import relate
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.families import OfEveryPair, OfPair
-from modegraph.certify.unit import TargetSpec
+from modegraph.certify.targets.spec import TargetSpec
 from modegraph.deadline import Deadline
 from tests.certify.class_graphs import one_integrator
 

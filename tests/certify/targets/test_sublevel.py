@@ -10,8 +10,9 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.switching.common_time import Reach, find_crossings
+from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.targets.sublevel import SublevelRegion, target_region
-from modegraph.certify.unit import TargetSpec, certify_unit
+from modegraph.certify.unit import certify_unit
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.deadline import Deadline
 from modegraph.enclosure.monomials import monomials

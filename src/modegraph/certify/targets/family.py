@@ -180,7 +180,7 @@ def target_class(mode: Mode | Target, p: Floats | None, plant: int) -> TargetCla
         return _fixed(start, mode.name, plant, mode.reference.region)
     if start.dim != plant:
         raise ModegraphError(f"mode {mode.name!r}: a target over a memory cannot depend on a continuous class yet")
-    _require_plain(mode, start)
+    require_plain(mode, start)
     n, traced = start.dim, start.set
     eye = np.eye(n)
     nothing = np.zeros((n, n))
@@ -200,7 +200,7 @@ def target_class(mode: Mode | Target, p: Floats | None, plant: int) -> TargetCla
     )
 
 
-def _require_plain(mode: Mode, start: StartClass) -> None:
+def require_plain(mode: Mode, start: StartClass) -> None:
     """The start function gives in floats what its formula says, at some references of the class.
 
     A formula that cancels does not: a run would enter another set than was proved.

@@ -53,7 +53,7 @@ def is_subset(inner: Set, outer: Set) -> bool:
     if isinstance(outer, Ball):
         return _in_ball(inner, outer)
     if isinstance(outer, Ellipsoid):
-        return _in_quadric(inner, exact.fractions(outer.c), outer.inverse_shape)
+        return in_quadric(inner, exact.fractions(outer.c), outer.inverse_shape)
     if isinstance(outer, Zonotope):
         return _in_zonotope(inner, outer)
     return False
@@ -69,29 +69,28 @@ def _in_ball(inner: Set, outer: Ball) -> bool:
         room = radius - Fraction(inner.radius)
         offset = _minus(exact.fractions(inner.c), center)
         return room >= 0 and exact.dot(offset, offset) <= room**2
-    return _in_quadric(inner, center, exact.identity(inner.dim, 1 / radius**2))
+    return in_quadric(inner, center, exact.identity(inner.dim, 1 / radius**2))
 
 
-def _in_quadric(inner: Set, center: exact.Row, weight: exact.Matrix) -> bool:
+def in_quadric(inner: Set, center: exact.Row, weight: exact.Matrix) -> bool:
     """Whether inner lies in {x : (x - center)' weight (x - center) <= 1}."""
     if isinstance(inner, Ball) and inner.radius == 0:
         return exact.quadratic_form(weight, _minus(exact.fractions(inner.c), center)) <= 1
     if isinstance(inner, Ball):
         squared = Fraction(inner.radius) ** 2
         own, shape = exact.identity(inner.dim, 1 / squared), float(squared) * np.eye(inner.dim)
-        return _quadric_in_quadric(_minus(exact.fractions(inner.c), center), own, shape, weight)
+        return quadric_in_quadric(_minus(exact.fractions(inner.c), center), own, shape, weight)
     if isinstance(inner, Ellipsoid):
         offset = _minus(exact.fractions(inner.c), center)
-        return _quadric_in_quadric(offset, inner.inverse_shape, inner.shape, weight)
-    if _generators_in_quadric(inner, center, weight):
+        return quadric_in_quadric(offset, inner.inverse_shape, inner.shape, weight)
+    if generators_in_quadric(*_as_zonotope(inner), center, weight):
         return True
     corners = inner.vertices()
     return corners is not None and all(exact.quadratic_form(weight, _minus(corner, center)) <= 1 for corner in corners)
 
 
-def _generators_in_quadric(inner: Set, center: exact.Row, weight: exact.Matrix) -> bool:
+def generators_in_quadric(middle: exact.Row, generators: exact.Matrix, center: exact.Row, weight: exact.Matrix) -> bool:
     """Sufficient: bound the square of offset + sum g_k z_k term by term (exact for orthogonal generators)."""
-    middle, generators = _as_zonotope(inner)
     offset = _minus(middle, center)
     weighted = [exact.times(weight, g) for g in generators]
     total = exact.quadratic_form(weight, offset)
@@ -111,7 +110,7 @@ def _as_zonotope(region: Set) -> tuple[exact.Row, exact.Matrix]:
     ]
 
 
-def _quadric_in_quadric(offset: exact.Row, own: exact.Matrix, shape: Floats, weight: exact.Matrix) -> bool:
+def quadric_in_quadric(offset: exact.Row, own: exact.Matrix, shape: Floats, weight: exact.Matrix) -> bool:
     """S-lemma: {y'own y <= 1} lies in {(y + offset)'weight(y + offset) <= 1} iff, for some m >= 0,
 
         [m own - weight          -weight offset              ]
