@@ -96,3 +96,20 @@ def test_a_check_that_fails_names_the_constraint_and_when() -> None:
     assert check.until is not None
     assert constraint.fields["time"] == pytest.approx(check.until)
     assert forever.fields["until"] == check.until
+
+
+def test_the_slack_of_a_class_is_that_at_its_entry_too() -> None:
+    """Starts up to .2 from the reference, .05 from the limit; later, when the flow was restarted, they are nearer."""
+    plant = mg.System(
+        lambda x, u, w: np.array([x[1], u[0] - 0.3 * np.sin(x[0]) + w[0]]), states=2, inputs=1,
+        disturbance=mg.Box([-0.02], [0.02]),
+    )  # fmt: skip
+    mode = mg.Mode(
+        "m", plant, controller=lambda x, r: -4.0 * (x[:1] - r) - 4.0 * x[1:],
+        reference=mg.setpoint(mg.Box([-0.5], [0.5])), start=lambda r: mg.Ball([r[0], 0.0], 0.2),
+        constraints=lambda x, r: {"near": x[0] - r[0] <= 0.25},
+    )  # fmt: skip
+    (relation,) = related(mode, [mode]).relations
+    assert isinstance(relation, Relation)
+    assert 0.0 < relation.slack["near"] <= 0.05
+    assert relation.extremes[0] > 1.0

@@ -15,10 +15,10 @@ from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.tail.box import Tail
 
 
-def compiled(limit: float | None, dynamics: Any = lambda x, u: u - x, lo: float = 0.5) -> CompiledMode:
+def compiled(limit: float | None, dynamics: Any = lambda x, u: u - x, lo: float = 0.5, hi: float = 1.0) -> CompiledMode:
     mode = mg.Mode(
         "m", mg.System(dynamics, states=1, inputs=1), controller=lambda x: 0.0, reference=mg.setpoint([0.0]),
-        output=lambda x: x, start=mg.Box([lo], [1.0]),
+        output=lambda x: x, start=mg.Box([lo], [hi]),
         constraints=None if limit is None else lambda x: {"top": x[0] <= limit},
     )  # fmt: skip
     return compile_mode(mode, None)
@@ -40,6 +40,14 @@ def test_the_slack_is_the_least_of_the_flows_and_of_the_tail() -> None:
     assert found.start == 1.0
     assert BehindFlows([one], replace(TAIL, face_upper=np.array([-9.0]))).slack["top"] == pytest.approx(1.0, abs=1e-3)
     assert found.tracking[0] >= max(0.5, *(s.tracking[0] for s in one.steps))
+
+
+def test_the_slack_of_what_was_passed_first_counts() -> None:
+    """The first flow begins at 1.9, where the limit is 2; the tail has more room, and so has what follows."""
+    flows = [flow(compiled(2.0, hi=1.9)), flow(compiled(2.0))]
+    for order in (flows, flows[::-1]):
+        found = BehindFlows(order, replace(TAIL, face_upper=np.array([-9.0])))
+        assert found.slack["top"] == pytest.approx(0.1, abs=1e-3)
 
 
 @pytest.mark.parametrize("order", [0, 1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.continuous import ContinuousReferences
-from modegraph.certify.relation import Relation
+from modegraph.certify.moments import at_state
+from modegraph.certify.relation import Part, Relation, whole_relation
+from modegraph.certify.targets.family import target_class
 from tests.certify.class_graphs import double_integrators, one_integrator
 
 
@@ -150,3 +153,33 @@ def test_the_part_and_the_instant_that_decide_a_pair_are_those_told(case: tuple[
     assert when == pytest.approx(20.0)
     alone = Relation(relation.region, relation.goal, (relation.parts[part],), None)
     assert alone.crossings(source, target).gauge[0] == relation.crossings(source, target).gauge[0] > 1.0
+
+
+INTERVAL = target_class(mg.Target("interval", mg.Box([-1.0], [1.0])), None, 1)
+
+
+def reached(*looks: tuple[float, float]) -> Part:
+    """A part that is at x after so many seconds, for looks (seconds, x)."""
+    flows = [replace(at_state(np.array([x]), INTERVAL), times=np.array([t]), energy=np.array([t])) for t, x in looks]
+    return Part(tuple(flows))
+
+
+NONE = np.zeros((1, 0)), np.zeros((1, 0))
+EARLY, LATE, NEVER_THERE = reached((1.0, 0.5)), reached((1.0, 5.0), (3.0, 0.5)), reached((1.0, 5.0), (3.0, 4.0))
+
+
+@pytest.mark.parametrize("parts", [(EARLY, LATE), (LATE, EARLY)])
+def test_all_parts_are_there_when_the_last_is(parts: tuple[Part, ...]) -> None:
+    found = whole_relation(None, INTERVAL, parts, None).crossings(*NONE)
+    assert found.certified[0]
+    assert found.latest[0] == 3.0
+    assert found.energy[0] == 3.0
+
+
+@pytest.mark.parametrize(
+    "parts", [(EARLY, None), (None, EARLY), (EARLY, NEVER_THERE), (NEVER_THERE, EARLY), (None, None), ()]
+)
+def test_one_part_that_is_not_there_is_enough_for_nothing(parts: tuple[Part | None, ...]) -> None:
+    relation = whole_relation(None, INTERVAL, parts, None)
+    assert not relation.certified(*NONE)[0]
+    assert not relation.crossings(*NONE).certified[0]

@@ -20,6 +20,21 @@ def scalar_sinking() -> Sinking:
     return Sinking(funnel, 0, funnel.rungs[0].radius, 2.0)
 
 
+def test_a_funnel_is_as_wide_as_its_mouth() -> None:
+    """The constraints of all rungs count, the widest first; |x| <= 3 at the mouth of about 1."""
+    limits = lambda x: {"top": x[0] <= 3.0}
+    loop = settled(lambda x, w: np.array([-x[0] + w[0]]), 1, mg.Box([-0.1], [0.1]), constraints=limits)
+    funnel = FunnelBuilder(loop).build(np.linspace(-1.0, 1.0, 21)[:, None], np.ones(1), lambda s: False)
+    assert isinstance(funnel, Funnel)
+    assert len(funnel.rungs) > 1
+    assert funnel.rungs[0].lower < 0.9 * funnel.rungs[0].radius
+    sinking = Sinking(funnel, 0, funnel.rungs[0].radius, 0.0)
+    tail = sinking.tail()
+    assert tail.face_upper[0] >= tail.hi[0] - 3.0 - 1e-9
+    assert tail.hi[0] >= 0.99
+    assert sinking.slack()["top"] <= 2.01
+
+
 def test_arrival_is_no_earlier_than_the_worst_trajectory() -> None:
     sinking = scalar_sinking()
     start = sinking.funnel.rungs[0].radius * abs(float(sinking.funnel.rungs[0].norm.axes[0, 0]))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.unit import compile_mode
+from modegraph.reach.compiled import compile_mode
 from modegraph.reach.failure import Mechanism
 from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.tail.box import Tail, TailFailure, TailSearch, relevant_states
@@ -181,3 +181,19 @@ def test_one_reference_that_does_not_settle_is_enough(top: float, good: bool) ->
     """The gain of the reference p = 1 is 1 - top: below 0 it leaves, after the horizon."""
     verdict = mg.build([line_class(9.0, lambda r: 1.0 - top * r * r)], horizon=2.0).check("held")
     assert (verdict.status is mg.Status.CERTIFIED) is good
+
+
+def test_an_invariant_set_keeps_its_constraints_where_it_begins() -> None:
+    """A slow spiral: the set leaves itself before it returns, and is largest in the first state at the beginning."""
+    source = mode(
+        lambda x, u: np.array([u[0] - 0.1 * x[0] + x[1], -x[0] - 0.1 * x[1]]), mg.Box([-0.5, -0.5], [0.5, 0.5])
+    )
+    c = compile_mode(source, None)
+    flow = c.flow(c.whole(), Order(1, 0))
+    assert flow.run(1.0)
+    search = TailSearch(c.fields[-1], flow.piece.chart, c.w_centre, c.w_radius, c.loop.names, Order(1, 0))
+    tail = search.attempt([flow])
+    assert isinstance(tail, Tail)
+    # All of the end is in the set: what is proved of the limit x <= 2 is no better than the end itself.
+    assert tail.face_upper[0] >= flow.end_box()[1][0] - 2.0
+    assert tail.face_upper[0] >= tail.hi[0] - 2.0 - 1e-9
