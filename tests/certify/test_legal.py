@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.evidence import unproved
+from modegraph.certify.legal import unproved
 from modegraph.certify.switching.common_time import proved_instants
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.failure import Failure, Mechanism
