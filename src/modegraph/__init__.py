@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
+from modegraph.errors import ModegraphError, ModegraphWarning, NotBuiltYet, Unreachable
 
 if TYPE_CHECKING:
     from modegraph.certify.largest_start import largest_start
@@ -48,6 +48,7 @@ __all__ = [
     "Mode",
     "ModeGraph",
     "ModegraphError",
+    "ModegraphWarning",
     "NotBuiltYet",
     "Plan",
     "Points",

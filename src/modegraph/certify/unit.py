@@ -157,7 +157,8 @@ class _Unit:
             self._prove()
         except ModegraphError as error:
             # A limit of the engine, not of the model: that was checked when the mode was compiled.
-            self.check = self.check or Verdict(Status.UNDECIDED, str(error))
+            if self.check is None:
+                self.check = Verdict(Status.UNDECIDED, str(error))
             for k in range(len(self.targets)):
                 self.verdicts.setdefault(k, Verdict(Status.UNDECIDED, str(error), horizon=self.horizon))
         assert self.check is not None

@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal
+from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
+
+from modegraph.errors import ModegraphError
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +22,12 @@ class Status(Enum):
     CERTIFIED = "certified"
     REFUTED = "refuted"
     UNDECIDED = "undecided"
+
+    def __bool__(self) -> NoReturn:
+        raise ModegraphError(
+            f"a status has no truth value (this one is {self.value}): compare it, "
+            "such as verdict.status is mg.Status.CERTIFIED, or ask the verdict for .certified or .refuted"
+        )
 
 
 @dataclass(frozen=True)
@@ -172,3 +180,19 @@ class Verdict:
     widths: Widths | None = None
     closest: Approach | None = None
     unproved: Unproved | None = None
+
+    @property
+    def certified(self) -> bool:
+        """Whether condition (C), or the limits of a check, were proved."""
+        return self.status is Status.CERTIFIED
+
+    @property
+    def refuted(self) -> bool:
+        """Whether a validated counterexample was found."""
+        return self.status is Status.REFUTED
+
+    def __bool__(self) -> NoReturn:
+        raise ModegraphError(
+            f"a verdict has no truth value (this one is {self.status.value}): ask for .certified or .refuted; "
+            "what is neither is undecided"
+        )

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.model.immutable import Replaceable
 from modegraph.model.memory import Memory
 from modegraph.model.names import require_callable, require_name
 from modegraph.model.reference import Floats, Reference, text_of
@@ -14,7 +15,7 @@ from modegraph.model.system import System
 from modegraph.model.trajectory import positive
 
 
-class Mode:
+class Mode(Replaceable):
     """A control mode q_i (Definition 2.1 of the paper). Everything is kept under its own name.
 
     Parameters

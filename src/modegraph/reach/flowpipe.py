@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -279,8 +278,7 @@ def flowpipe(
         raise ModegraphError(f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each")
     p = mode.find(r, whole=True)
     if start is not None:
-        mode = copy(mode)
-        mode.start = start
+        mode = mode.replace(start=start)
     label = f"mode {mode.label_of(p)!r}"
     end = _horizon(mode, horizon, label)
     compiled = compile_mode(mode, p, observed=False)

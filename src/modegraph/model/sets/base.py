@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modegraph.errors import ModegraphError
+from modegraph.model.immutable import Immutable
 from modegraph.model.sets import exact
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 Face = tuple[exact.Row, Fraction]
 
 
-class Set(ABC):
+class Set(Immutable, ABC):
     """A closed set of states, inputs or disturbances, convex unless it is a Sublevel; its doubles are exact numbers.
 
     Sets are immutable: their arrays are read-only copies of what was given.
@@ -68,7 +69,7 @@ class Set(ABC):
     def _outline(self, dims: tuple[int, int]) -> Floats:
         """Corners, (k, 2) in order, of the projection onto two coordinates, for drawing."""
 
-    def settle(self, *dims: int) -> None:  # noqa: B027
+    def settle(self, *dims: int) -> None:
         """Take the first of these dimensions that fits, if the set does not know its own (only a Sublevel may not)."""
 
     def is_empty(self) -> bool:

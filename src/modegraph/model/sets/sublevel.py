@@ -77,7 +77,7 @@ class Sublevel(Set):
                 except ModegraphError as error:
                     problem = problem or error
                     continue
-                self._dim = dim
+                self.__dict__["_dim"] = dim
                 return
             assert problem is not None
             raise problem
