@@ -31,6 +31,9 @@ class TracedArray(np.ndarray[Any, Any]):
 
         return apply(func, args, kwargs)
 
+    def used(self) -> None:
+        """Called where the array is taken as a whole; one that is watched notes it."""
+
     def __setitem__(self, key: Any, value: Any) -> None:
         if isinstance(value, (list, tuple, np.ndarray)):
             value = nested(value)
@@ -60,6 +63,8 @@ def nested(values: Any) -> Objects:
     Raises `ModegraphError` where the shapes of a sequence's entries differ.
     """
     if isinstance(values, np.ndarray):
+        if isinstance(values, TracedArray):
+            values.used()
         return plain(values) if values.dtype == object else values.astype(object)
     if isinstance(values, (list, tuple)):
         entries = [nested(v) for v in values]

@@ -23,7 +23,7 @@ class Mode(Replaceable):
     name : str
     system : System
     controller : callable
-        Reads by name any of x, r, t, z; returns (p,), or a number when p = 1.
+        Reads by name any of x, r, t, z; returns (p,), or a number when p = 1. None for a plant without inputs.
     reference : Reference
         From :func:`setpoint`, :func:`trajectory`, :func:`quintic`, ...
     start : callable or set
@@ -44,7 +44,7 @@ class Mode(Replaceable):
         name: str,
         system: System,
         *,
-        controller: Callable[..., Any],
+        controller: Callable[..., Any] | None,
         reference: Reference,
         start: Callable[..., Any] | Set,
         constraints: Callable[..., Any] | None = None,
@@ -68,8 +68,12 @@ class Mode(Replaceable):
             )
         if memory is not None and not isinstance(memory, Memory):
             raise ModegraphError(f"{self.label}: memory must be a Memory, got {type(memory).__name__}")
-        require_callable(controller, f"{self.label}: controller")
-        for role, function in (("constraints", constraints), ("output", output)):
+        if controller is None and system.p:
+            raise ModegraphError(
+                f"{self.label}: controller must be a function; None is for a plant without inputs (inputs=0), and "
+                f"this one has {', '.join(system.inputs)}"
+            )
+        for role, function in (("controller", controller), ("constraints", constraints), ("output", output)):
             if function is not None:
                 require_callable(function, f"{self.label}: {role}")
         if not isinstance(start, Set) and not callable(start):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from modegraph.cores import in_parallel, one_core
 from modegraph.errors import ModegraphError
+from modegraph.model.faithful import require_faithful
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box, Set
 from modegraph.reach.chain import Chain
@@ -281,6 +282,7 @@ def flowpipe(
         mode = mode.replace(start=start)
     label = f"mode {mode.label_of(p)!r}"
     end = _horizon(mode, horizon, label)
+    require_faithful(mode, p)
     compiled = compile_mode(mode, p, observed=False)
     with one_core():
         chains, stuck = Cutting(compiled, end).run()
