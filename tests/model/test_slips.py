@@ -100,6 +100,25 @@ def test_what_may_well_be_meant(honest: list[mg.Mode]) -> None:
     assert told(honest) == []
 
 
+def factory(name: str, radius: float) -> mg.Mode:
+    return mg.Mode(
+        name, PLANT, controller=lambda x, r: GAINS[0] * (r - x), reference=mg.setpoint([0.0]),
+        start=mg.Box([-radius], [radius]),
+    )  # fmt: skip
+
+
+def test_a_factory_of_modes_whose_controller_reads_a_constant_of_the_module() -> None:
+    assert told([factory("a", 1.0), factory("b", 2.0)]) == []
+
+
+@pytest.mark.parametrize(("body", "count"), [("k * (r - x)", 1), ("np.sin(r - x)", 0)])
+def test_a_loop_at_the_top_level_of_a_module(body: str, count: int) -> None:
+    source = f"made = []\nfor k in (1.0, 2.0):\n    made.append(lambda x, r: {body})"
+    names: dict[str, Any] = {"np": np}
+    exec(source, names)
+    assert len(told(modes(names["made"]))) == count
+
+
 def test_a_factory_called_twice_for_the_same_start() -> None:
     (text,) = told(modes([gain(1.0), gain(1.0)], start=mg.Box([0.0], [1.0])))
     assert "'m0', 'm1'" in text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from functools import cache
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -83,21 +83,29 @@ def _functions(mode: Mode) -> dict[str, FunctionType]:
 
 
 def _made_alike(a: Mode, b: Mode) -> str:
-    """The role in which two modes have functions that differ in nothing but their identity; "" for none.
+    """The role in which two modes have functions of one line that nothing tells apart; "" for none.
 
-    Functions from two calls of one factory, such as ``pd(1, 2)``, have variables of their own and are not meant,
-    unless the starts are the same, too.
+    Functions from two calls of one factory, such as ``pd(1, 2)``, are not meant, unless the starts are the same, too.
     """
     theirs = _functions(b)
     for role, f in _functions(a).items():
         g = theirs.get(role)
         if g is None or f is g or f.__code__ is not g.__code__:
             continue
-        shared = all(x is y for x, y in zip(f.__closure__ or (), g.__closure__ or (), strict=True))
-        plain = not f.__defaults__ and not g.__defaults__ and not f.__kwdefaults__ and not g.__kwdefaults__
-        if (shared and plain) or a.start is b.start:
+        if _binds_late(f, g) or a.start is b.start:
             return role
     return ""
+
+
+def _binds_late(f: FunctionType, g: FunctionType) -> bool:
+    """Whether two functions of the same code share the variables they look up, as those made in one loop do."""
+    if f.__defaults__ or f.__kwdefaults__ or g.__defaults__ or g.__kwdefaults__:
+        return False
+    if f.__closure__ and g.__closure__:
+        return all(x is y for x, y in zip(f.__closure__, g.__closure__, strict=True))
+    looked_up = [f.__globals__[name] for name in f.__code__.co_names if name in f.__globals__]
+    at_top_level = "<locals>" not in f.__qualname__
+    return at_top_level and any(not callable(value) and not isinstance(value, ModuleType) for value in looked_up)
 
 
 def _same_references(a: Reference, b: Reference) -> bool:
