@@ -116,6 +116,8 @@ def test_a_sublevel_start_is_traced_twice() -> None:
     with pytest.raises(mg.ModegraphError, match=r"Sublevel, fn.* does not depend on its arguments alone"):
         require_faithful(mode(start=mg.Sublevel(lambda x: x @ x + 0.1 * RNG.random(), 1.0)))
     require_faithful(mode(start=lambda r: mg.Sublevel(lambda x: x @ x, 1.0)))
+    with pytest.raises(mg.ModegraphError, match=r"Sublevel, fn does not depend on its arguments alone: at x = "):
+        require_faithful(mode(start=mg.Sublevel(lambda x: x @ x * (2.0 if isinstance(x[0], float) else 1.0), 1.0)))
 
 
 def clipped(x: Any, r: Any) -> Any:
