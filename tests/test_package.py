@@ -31,7 +31,9 @@ def test_a_model_is_stated_without_what_proofs_and_drawings_need():
 def test_names_are_listed_and_found():
     assert {"System", "build", "Unreachable", "largest_start"} <= set(dir(mg))
     assert set(mg.__all__) <= set(dir(mg))
-    assert set(mg._HOME) | {"ModegraphError", "NotBuiltYet", "Unreachable", "load"} == set(mg.__all__)
+    assert set(mg._HOME) | {"ModegraphError", "ModegraphWarning", "NotBuiltYet", "Unreachable", "load"} == set(
+        mg.__all__
+    )
     assert mg.Status.CERTIFIED.value == "certified"
     assert mg.Box is mg.Box
 

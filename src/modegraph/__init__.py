@@ -9,7 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from modegraph import api  # noqa: F401  the methods that classes take when they are made
-from modegraph.errors import ModegraphError, NotBuiltYet, Unreachable
+from modegraph.errors import ModegraphError, ModegraphWarning, NotBuiltYet, Unreachable
 
 if TYPE_CHECKING:
     from modegraph.certify.largest_start import largest_start
@@ -50,6 +50,7 @@ __all__ = [
     "Mode",
     "ModeGraph",
     "ModegraphError",
+    "ModegraphWarning",
     "NotBuiltYet",
     "Outcome",
     "Plan",

@@ -20,6 +20,14 @@ class NotBuiltYet(ModegraphError):
     """
 
 
+class NoSuchAttribute(ModegraphError, AttributeError):
+    """An attribute that an object of a model does not have, most likely misspelt."""
+
+
+class ModegraphWarning(UserWarning):
+    """A model that can be worked with, but hardly says what its author meant. The text says what to do about it."""
+
+
 class Unreachable(ModegraphError):
     """No chain of certified switches leads to the goal (Theorem 4.1 has no path).
 

@@ -57,6 +57,27 @@ ENGINE_FAULTS = (
         (ZERO_TIME,),
     ),
     Fault(
+        "a function that changes between calls is proved for what it was once",
+        "expression/repeatable.py",
+        "    if before != after and after != (last := again()):\n",
+        "    if before != after and after != (last := after):\n",
+        ("tests/expression/test_repeatable.py", "tests/model/test_faithful.py"),
+    ),
+    Fault(
+        "plain numbers are not compared with the trace",
+        "expression/repeatable.py",
+        "        return int(wrong[0])\n",
+        "        return None\n",
+        ("tests/expression/test_repeatable.py", "tests/model/test_faithful.py"),
+    ),
+    Fault(
+        "a forgotten disturbance is certified",
+        "model/faithful.py",
+        "    if not loop.unread:\n",
+        "    if True:\n",
+        ("tests/model/test_faithful.py",),
+    ),
+    Fault(
         "the invariant set of a class stays where its middle is",
         "reach/tail/box.py",
         "            chart = replace(chart, tilt=self._tilt)\n",

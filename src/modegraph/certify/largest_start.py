@@ -9,6 +9,7 @@ from modegraph.certify.decision import decide
 from modegraph.certify.question import Question
 from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError
+from modegraph.model.faithful import require_faithful
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Set, Sublevel
 from modegraph.model.sets.scaled import scaled
@@ -55,6 +56,7 @@ def largest_start(mode: Mode, shape: Set, r: Any = None) -> float:
     p = mode.find(r)
     owner = f"largest_start of mode {mode.label_of(p)!r}"
     _require_shape(mode, shape, owner)
+    require_faithful(mode, p)
     return _Search(mode, compile_mode(mode, p, shape), shape).run()
 
 

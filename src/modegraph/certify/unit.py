@@ -129,7 +129,8 @@ class _Unit:
         except ModegraphError as error:
             # A limit of the engine, not of the model: that was checked when the mode was compiled.
             why = (Reason(Outcome.ENGINE_LIMIT, text=str(error)),)
-            self.check = self.check or Verdict(Status.UNDECIDED, why)
+            if self.check is None:
+                self.check = Verdict(Status.UNDECIDED, why)
             for k in range(len(self.targets)):
                 self.verdicts.setdefault(k, Verdict(Status.UNDECIDED, why, horizon=self.horizon))
         assert self.check is not None

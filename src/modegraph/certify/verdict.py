@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal
+from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.reason import Outcome, Reason, Why
+from modegraph.errors import ModegraphError
 from modegraph.reach.statement import texts, told
 
 Floats = NDArray[np.float64]
@@ -22,6 +23,12 @@ class Status(Enum):
     CERTIFIED = "certified"
     REFUTED = "refuted"
     UNDECIDED = "undecided"
+
+    def __bool__(self) -> NoReturn:
+        raise ModegraphError(
+            f"a status has no truth value (this one is {self.value}): compare it, "
+            "such as verdict.status is mg.Status.CERTIFIED, or ask the verdict for .certified or .refuted"
+        )
 
 
 @dataclass(frozen=True)
@@ -184,3 +191,19 @@ class Verdict:
     def reason(self) -> str:
         """`why` as prose."""
         return told(self.why) if self.status is Status.UNDECIDED else texts(self.why)
+
+    @property
+    def certified(self) -> bool:
+        """Whether condition (C), or the limits of a check, were proved."""
+        return self.status is Status.CERTIFIED
+
+    @property
+    def refuted(self) -> bool:
+        """Whether a validated counterexample was found."""
+        return self.status is Status.REFUTED
+
+    def __bool__(self) -> NoReturn:
+        raise ModegraphError(
+            f"a verdict has no truth value (this one is {self.status.value}): ask for .certified or .refuted; "
+            "what is neither is undecided"
+        )

@@ -28,6 +28,9 @@ class TracedArray(np.ndarray[Any, Any]):
     def __array_function__(self, func: Callable[..., Any], types: Any, args: Any, kwargs: Any) -> Any:
         return RULES.function(func, args, kwargs)
 
+    def used(self) -> None:
+        """Called where the array is taken as a whole; one that is watched notes it."""
+
     def __setitem__(self, key: Any, value: Any) -> None:
         if isinstance(value, (list, tuple, np.ndarray)):
             value = nested(value)
@@ -57,6 +60,8 @@ def nested(values: Any) -> Objects:
     Raises `ModegraphError` where the shapes of a sequence's entries differ.
     """
     if isinstance(values, np.ndarray):
+        if isinstance(values, TracedArray):
+            values.used()
         return plain(values) if values.dtype == object else values.astype(object)
     if isinstance(values, (list, tuple)):
         entries = [nested(v) for v in values]

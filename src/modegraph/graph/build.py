@@ -25,8 +25,10 @@ from modegraph.graph.classes import Classes, Link
 from modegraph.graph.modegraph import ModeGraph, Node
 from modegraph.graph.progress import Progress, reporting
 from modegraph.guarded import note
-from modegraph.model.closed_loop import close_loop, mode_start
+from modegraph.model.closed_loop import mode_start
+from modegraph.model.faithful import require_faithful
 from modegraph.model.mode import Mode
+from modegraph.model.slips import warn_of_slips
 from modegraph.model.target import Target
 from modegraph.model.validation import validate_modes
 
@@ -89,6 +91,7 @@ def build(
     _positive("horizon", horizon)
     _positive("budget", budget)
     modes = validate_modes(modes)
+    _examine(modes)
     units = _units(modes, horizon)
     with reporting(progress) as report:
         cuts = 0 if budget is None else int(float(budget) / len(units) / SECONDS_A_CUT)
@@ -158,20 +161,27 @@ def _positive(name: str, value: float | None) -> None:
         raise ModegraphError(f"build: {name} must be a positive number of seconds or None, not {value!r}")
 
 
+def _examine(modes: Sequence[Mode | Target]) -> None:
+    """Trace every closed loop, so that a wrong model fails before any proof, and warn of what looks like a slip."""
+    real = [mode for mode in modes if isinstance(mode, Mode)]
+    loops = [
+        [require_faithful(mode, p) for p in ([None] if _is_class(mode) else mode.reference.parameters())]
+        for mode in real
+    ]
+    warn_of_slips(real, loops)
+
+
 def _units(modes: Sequence[Mode | Target], horizon: float | None) -> list[_Unit]:
-    """All units; every closed loop is traced once so that a wrong model fails before any proof."""
+    """All units of work."""
     nodes: list[tuple[Node, Any, Mode | Target]] = []
     for mode in modes:
         if isinstance(mode, Target):
             nodes.append(((mode.name, 0), None, mode))
             continue
         if mode.reference.region is not None:
-            close_loop(mode)
             nodes.append(((mode.name, 0), None, mode))
             continue
-        for a, p in enumerate(mode.reference.parameters()):
-            close_loop(mode, p)
-            nodes.append(((mode.name, a), p, mode))
+        nodes += [((mode.name, a), p, mode) for a, p in enumerate(mode.reference.parameters())]
     specs = {node: TargetSpec(name=mode.name, p=p, mode=mode) for node, p, mode in nodes}
     units = []
     for node, p, mode in nodes:

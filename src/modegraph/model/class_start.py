@@ -12,21 +12,25 @@ from numpy.typing import NDArray
 
 from modegraph.errors import ModegraphError
 from modegraph.expression.derivative import derivative
+from modegraph.expression.repeatable import Comparison, impure, twice
 from modegraph.expression.scalar import Expr, Graph
 from modegraph.expression.tape import compile_tape
 from modegraph.expression.trace import call
 from modegraph.model.mode import Mode
 from modegraph.model.reference import Floats, text_of
-from modegraph.model.sets import Box, Set
+from modegraph.model.sets import Box, Ellipsoid, Set
 from modegraph.model.sets.exact import fractions
 from modegraph.model.sets.level_function import Irrational, exact_value
-from modegraph.model.sets.parametrised import Condition, ParametrisedSet, TracedSet
-from modegraph.model.start import checked_start, mode_start, require_dimension
+from modegraph.model.sets.parametrised import Condition, ParametrisedSet, TracedSet, numbers
+from modegraph.model.start import checked_start, mode_start, require_dimension, require_same
 from modegraph.model.traced_reference import TracedReference
 from modegraph.model.trajectory import at_instant
 
 MOST_CELLS = 4000
 """Parts of the class that are looked at before a question is left undecided."""
+
+PLAINLY = 0.01
+"""Relative difference of two sets that is no rounding any more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,16 +78,55 @@ def class_start(mode: Mode) -> StartClass | Set:
     graph = Graph()
     parameters = graph.variables([f"p[{k}]" for k in range(region.dim)])
     time = graph.variable("t")
-    returned = returned_start(mode, graph, time, parameters)
-    if not isinstance(returned, ParametrisedSet):
-        return checked_start(mode, returned, owner)
-    traced = returned.traced(graph, f"{owner}, start")
+
+    def read() -> TracedSet | Set:
+        returned = returned_start(mode, graph, time, parameters)
+        if not isinstance(returned, ParametrisedSet):
+            return checked_start(mode, returned, owner)
+        return returned.traced(graph, f"{owner}, start")
+
+    traced = twice(read, _exprs, graph, f"{owner}, start")
+    if isinstance(traced, Set):
+        again = read()
+        assert isinstance(again, Set)
+        require_same(traced, again, owner)
+        return traced
     require_dimension(mode, traced.dim, owner)
     entries = [*traced.centre, *(e for row in traced.axes for e in row)]
     dropped = [Expr(graph, k) for k in dict.fromkeys(graph.dropped)]
     _require_existence(entries, dropped, traced.conditions, parameters, region, f"{owner}, start")
+    _require_faithful(mode, traced, parameters, region)
     middle = mode_start(mode, region.center)
     return StartClass(parameters, region, traced, np.asarray(middle.center, float))
+
+
+def _exprs(traced: TracedSet | Set) -> list[Expr]:
+    if isinstance(traced, Set):
+        return []
+    return [*traced.centre, *(e for row in traced.axes for e in row), *(c.expr for c in traced.conditions)]
+
+
+def _require_faithful(mode: Mode, traced: TracedSet, parameters: list[Expr], region: Box) -> None:
+    """Some of the sets computed with plain numbers must be those of the trace.
+
+    Not the place for digits lost to rounding: what a proof needs of them is proved with it.
+    """
+    compare = Comparison([e for c, row in zip(traced.centre, traced.axes, strict=True) for e in (c, *row)], parameters)
+    for p in (region.center, *(region.lo + part * (region.hi - region.lo) for part in (0.29, 0.83))):
+        p = np.clip(p, region.lo, region.hi)
+        instance = mode_start(mode, p)
+        where = f"mode {mode.label_of(p)!r}, start"
+        same = type(instance) is traced.kind
+        if same and isinstance(instance, Ellipsoid) and traced.ellipsoid is not None:
+            same = np.array_equal(instance.shape, traced.ellipsoid.shape)
+        centre, axes = numbers(instance) if same else (np.zeros(0), np.zeros((0, 0)))
+        called = np.column_stack([centre, axes]).ravel()
+        there = compare.values(p)[0]
+        close = called.shape == there.shape and np.abs(called - there).max() <= PLAINLY * (1.0 + np.abs(there).max())
+        if not close and (called.shape != there.shape or compare.first_wrong(p, called) is not None):
+            raise impure(
+                where, f"for the reference {text_of(p)} it gives {instance!r}, which is not what its trace gives"
+            )
 
 
 def returned_start(mode: Mode, graph: Graph, time: Expr, parameters: list[Expr]) -> Any:

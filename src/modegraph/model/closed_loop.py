@@ -9,10 +9,12 @@ from itertools import pairwise
 from typing import Any
 
 from modegraph.errors import ModegraphError
-from modegraph.expression.ops import LOG, RECIP, WHERE
+from modegraph.expression.ops import LOG, RECIP, VAR, WHERE
 from modegraph.expression.piecewise import resolve
+from modegraph.expression.repeatable import twice
 from modegraph.expression.scalar import Expr, Graph
 from modegraph.expression.trace import as_vector, call, required_arguments
+from modegraph.expression.watched import WatchedArray, WatchedConstants
 from modegraph.model.constraints import Face, faces_of
 from modegraph.model.mode import Mode
 from modegraph.model.numeric import require_finite_values, typical_values
@@ -87,6 +89,10 @@ class ClosedLoop:
     typical: Floats
     reset: list[Expr]
     has_constraints: bool
+    unread: tuple[str, ...] = ()
+    """What is uncertain and neither the dynamics nor the constraints read: "w[1]", "d['mass']"."""
+    idle: tuple[str, ...] = ()
+    """Names of the inputs that the dynamics do not read."""
 
 
 def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
@@ -118,20 +124,18 @@ def close_loop(mode: Mode, p: Floats | None = None) -> ClosedLoop:
         typical=typical_values(mode, start, None if p is not None else mode.reference.region),
         reset=trace.reset(),
         has_constraints=mode.constraints is not None,
+        unread=trace.unread(),
+        idle=tuple(name for k, name in enumerate(mode.system.inputs) if k not in trace.read_inputs),
     )
     require_finite_values(mode, some, start)
     return loop
 
 
-class _Unknowns(dict[str, Expr]):
-    """``d`` while tracing: d["name"] with a clear error for a name that was not declared."""
-
-    def __missing__(self, name: object) -> Expr:
-        raise ModegraphError(
-            f"d[{name!r}] is not an unknown constant of the plant; it has "
-            f"{', '.join(map(repr, self)) or 'none'}: "
-            "declare it in System(..., unknowns={name: (lo, hi)})"
-        )
+def _undeclared(names: Sequence[str], name: object) -> ModegraphError:
+    return ModegraphError(
+        f"d[{name!r}] is not an unknown constant of the plant; it has {', '.join(map(repr, names)) or 'none'}: "
+        "declare it in System(..., unknowns={name: (lo, hi)})"
+    )
 
 
 class _Trace:
@@ -146,7 +150,10 @@ class _Trace:
         self.z = [self._variable(name, taken) for name in mode.state_names[mode.system.n :]]
         self.time = self._variable("t", taken)
         self.w = [self._variable(f"w[{k}]", taken) for k in range(mode.system.q)]
-        self.d = _Unknowns((name, self._variable(f"d[{name!r}]", taken)) for name in mode.system.unknowns)
+        self.d = {name: self._variable(f"d[{name!r}]", taken) for name in mode.system.unknowns}
+        self.constants = WatchedConstants(self.d, lambda name: _undeclared(list(self.d), name))
+        self.read_inputs: set[int] = set()
+        self.read_disturbances: set[int] = set()
         region = mode.reference.region
         whole = p is None and region is not None
         self.p = [self._variable(f"p[{k}]", taken) for k in range(region.dim)] if region and whole else []
@@ -167,16 +174,15 @@ class _Trace:
         seen: dict[str, Any] = {"x": x, "r": r, "t": self.time}
         if mode.memory is not None:
             seen["z"] = fixed(self.z)
-        inputs = self._vector(mode.controller, "controller", seen, mode.system.p)
+        inputs = [] if mode.controller is None else self._vector(mode.controller, "controller", seen, mode.system.p)
         u = fixed(inputs)
-        plant = {"x": x, "u": u, **self._uncertain()}
+        plant = {"x": x, "u": WatchedArray.of(inputs, self.read_inputs), **self._uncertain()}
         rhs = self._vector(mode.system.dynamics, "dynamics", plant, mode.system.n)
         if mode.memory is not None:
             rhs += self._vector(mode.memory.dynamics, "memory dynamics", {**seen, "u": u}, mode.memory.k)
         faces: list[Face] = []
         if mode.constraints is not None:
-            returned = self._call(mode.constraints, "constraints", {**seen, "u": u, **self._uncertain()})
-            faces = faces_of(returned, f"{self.owner}, constraints")
+            faces = self._faces(mode.constraints, {**seen, "u": u, **self._uncertain()})
         tracking: list[Expr] = []
         if mode.output is not None:
             output = self._vector(mode.output, "output", {"x": x}, len(piece.value))
@@ -213,14 +219,35 @@ class _Trace:
     def _uncertain(self) -> dict[str, Any]:
         available: dict[str, Any] = {}
         if self.w:
-            available["w"] = fixed(self.w)
+            available["w"] = WatchedArray.of(self.w, self.read_disturbances)
         if self.d:
-            available["d"] = self.d
+            available["d"] = self.constants
         return available
 
+    def unread(self) -> tuple[str, ...]:
+        """Disturbances and unknowns that no function has touched, whether or not they left a trace."""
+        graph, mask = self.graph, 0
+        for index, node in enumerate(graph.nodes):
+            mask |= 0 if node.op == VAR else graph.masks[index]
+        seen = {f"w[{k}]" for k in self.read_disturbances} | {f"d[{name!r}]" for name in self.constants.touched}
+        uncertain = {**{f"w[{k}]": e for k, e in enumerate(self.w)}, **{f"d[{n!r}]": e for n, e in self.d.items()}}
+        return tuple(n for n, e in uncertain.items() if n not in seen and not graph.masks[e.index] & mask)
+
     def _vector(self, function: Any, role: str, available: Mapping[str, Any], length: int) -> list[Expr]:
-        value = self._call(function, role, available)
-        return as_vector(value, length, role=role, owner=self.owner, graph=self.graph)
+        def read() -> list[Expr]:
+            value = self._call(function, role, available)
+            return as_vector(value, length, role=role, owner=self.owner, graph=self.graph)
+
+        return twice(read, list, self.graph, f"{self.owner}, {role}")
+
+    def _faces(self, function: Any, available: Mapping[str, Any]) -> list[Face]:
+        where = f"{self.owner}, constraints"
+        return twice(
+            lambda: faces_of(self._call(function, "constraints", available), where),
+            lambda faces: [face.expr for face in faces],
+            self.graph,
+            where,
+        )
 
     def _call(self, function: Any, role: str, available: Mapping[str, Any]) -> Any:
         missing = [

@@ -42,7 +42,7 @@ def faces_of(returned: Any, where: str) -> list[Face]:
     for name, value in returned.items():
         if not isinstance(name, str) or not name.strip():
             raise ModegraphError(f"{where}: the name {name!r} of a constraint must be a non-empty string")
-        for suffix, relation in _relations(value):
+        for suffix, relation in relations(value):
             label = name + suffix
             if not isinstance(relation, Relation):
                 raise ModegraphError(f"{where}: {label!r} {_complaint(relation)}")
@@ -50,11 +50,11 @@ def faces_of(returned: Any, where: str) -> list[Face]:
     return faces
 
 
-def _relations(value: Any) -> Iterator[tuple[str, Any]]:
+def relations(value: Any) -> Iterator[tuple[str, Any]]:
     """Index text and entry of a scalar, list or array."""
     if isinstance(value, list | tuple):
         for k, entry in enumerate(value):
-            for suffix, relation in _relations(entry):
+            for suffix, relation in relations(entry):
                 yield f"[{k}]{suffix}", relation
     elif isinstance(value, np.ndarray) and value.ndim:
         plain = value.view(np.ndarray)

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 from modegraph.errors import ModegraphError
+from modegraph.model.immutable import Replaceable
 from modegraph.model.names import names_of, require_callable
 from modegraph.model.system import Names
 
 
-class Memory:
+class Memory(Replaceable):
     """Controller states z with z' = dynamics(x, u, r, t, z), set to reset(x, r) when the mode is entered.
 
     Parameters

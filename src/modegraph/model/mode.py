@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from modegraph.errors import ModegraphError, NotBuiltYet
+from modegraph.model.immutable import Replaceable
 from modegraph.model.memory import Memory
 from modegraph.model.names import require_callable, require_name
 from modegraph.model.reference import Floats, Reference, text_of
@@ -14,7 +15,7 @@ from modegraph.model.system import System
 from modegraph.model.trajectory import positive
 
 
-class Mode:
+class Mode(Replaceable):
     """A control mode q_i (Definition 2.1 of the paper). Everything is kept under its own name.
 
     Parameters
@@ -22,7 +23,7 @@ class Mode:
     name : str
     system : System
     controller : callable
-        Reads by name any of x, r, t, z; returns (p,), or a number when p = 1.
+        Reads by name any of x, r, t, z; returns (p,), or a number when p = 1. None for a plant without inputs.
     reference : Reference
         From :func:`setpoint`, :func:`trajectory`, :func:`quintic`, ...
     start : callable or set
@@ -43,7 +44,7 @@ class Mode:
         name: str,
         system: System,
         *,
-        controller: Callable[..., Any],
+        controller: Callable[..., Any] | None,
         reference: Reference,
         start: Callable[..., Any] | Set,
         constraints: Callable[..., Any] | None = None,
@@ -67,8 +68,12 @@ class Mode:
             )
         if memory is not None and not isinstance(memory, Memory):
             raise ModegraphError(f"{self.label}: memory must be a Memory, got {type(memory).__name__}")
-        require_callable(controller, f"{self.label}: controller")
-        for role, function in (("constraints", constraints), ("output", output)):
+        if controller is None and system.p:
+            raise ModegraphError(
+                f"{self.label}: controller must be a function; None is for a plant without inputs (inputs=0), and "
+                f"this one has {', '.join(system.inputs)}"
+            )
+        for role, function in (("controller", controller), ("constraints", constraints), ("output", output)):
             if function is not None:
                 require_callable(function, f"{self.label}: {role}")
         if not isinstance(start, Set) and not callable(start):

@@ -68,7 +68,7 @@ def require_finite_values(mode: Mode, p: Floats | None, start: Set) -> None:
     seen: dict[str, object] = {"x": x, "r": r, "t": 0.0}
     if memory is not None:
         seen["z"] = z
-    u = values(mode.controller, seen, "controller", mode.system.p)
+    u = np.zeros(0) if mode.controller is None else values(mode.controller, seen, "controller", mode.system.p)
     plant: dict[str, object] = {"x": x, "u": u}
     if mode.system.disturbance is not None:
         plant["w"] = np.array(mode.system.disturbance.center)
@@ -103,6 +103,10 @@ def typical_values(mode: Mode, start: Set, region: Box | None) -> Floats:
 def _finite_vector(result: Any, length: int | None, where: str, x: Floats) -> Floats:
     try:
         vector = np.asarray(result, dtype=float)
+    except ModegraphError as error:
+        from modegraph.expression.repeatable import impure
+
+        raise impure(where, "it returns a value that it kept from an earlier call") from error
     except (TypeError, ValueError):
         raise ModegraphError(f"{where} returned {result!r}, not a vector of numbers; return np.array([...])") from None
     if vector.ndim == 0 and length in (1, None):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modegraph.errors import ModegraphError
+from modegraph.model.immutable import Immutable
 from modegraph.model.sets import Box, Set
 from modegraph.model.sets.base import frozen, vector
 
@@ -65,7 +66,7 @@ class ReferenceValue(np.ndarray[Any, Any]):
         return getattr(ufunc, method)(*plain, **kwargs)
 
 
-class Reference(ABC):
+class Reference(Immutable, ABC):
     """A class of references r(t; p), t seconds since the mode was entered: finite, or p in a box."""
 
     region: Box | None = None
@@ -154,7 +155,7 @@ class Reference(ABC):
         raise ModegraphError(f"{text_of(wanted)} names no reference; there is: {_listing(known)}")
 
 
-class Points(Sequence[Floats]):
+class Points(Immutable, Sequence[Floats]):
     """Finitely many reference values or trajectory parameters; iterating gives (m,) arrays."""
 
     def __init__(self, points: ArrayLike | Sequence[ArrayLike]) -> None:

@@ -11,8 +11,8 @@ from modegraph.model.numeric import call_numeric
 from modegraph.model.reference import Floats
 from modegraph.model.sets import Set, Sublevel
 
-_SUBLEVELS: WeakKeyDictionary[Mode, dict[bytes, tuple[object, Sublevel]]] = WeakKeyDictionary()
-"""Sublevel starts by mode and reference, with the function they came from: searching one is costly."""
+_STARTS: WeakKeyDictionary[Mode, dict[bytes, Set]] = WeakKeyDictionary()
+"""Starts by mode and reference: of finite classes, and Sublevels, which are costly to search."""
 
 
 def mode_start(mode: Mode, p: Floats | None = None) -> Set:
@@ -29,19 +29,41 @@ def mode_start(mode: Mode, p: Floats | None = None) -> Set:
         Names the mode, the reference and the remedy.
     """
     known = mode.find(p)
-    owner = f"mode {mode.label_of(known)!r}"
     name = b"" if known is None else known.tobytes()
-    recalled = _SUBLEVELS.get(mode, {}).get(name)
-    if recalled is not None and recalled[0] is mode.start:
-        return recalled[1]
+    recalled = _STARTS.get(mode, {}).get(name)
+    if recalled is not None:
+        return recalled
+    owner = f"mode {mode.label_of(known)!r}"
+    finite = mode.reference.region is None
     if isinstance(mode.start, Set):
-        start = mode.start
+        start = checked_start(mode, mode.start, owner)
     else:
-        start = call_numeric(mode.start, {"r": mode.reference.at(0.0, known)}, role="start", owner=owner)
-    start = checked_start(mode, start, owner)
-    if isinstance(start, Sublevel):
-        _SUBLEVELS.setdefault(mode, {})[name] = mode.start, start
+        start = checked_start(mode, _returned(mode, known, owner), owner)
+        if finite:
+            require_same(start, checked_start(mode, _returned(mode, known, owner), owner), owner)
+    if finite or isinstance(start, Sublevel):
+        _STARTS.setdefault(mode, {})[name] = start
     return start
+
+
+def _returned(mode: Mode, p: Floats | None, owner: str) -> Any:
+    """What ``start`` returns for the reference p."""
+    try:
+        r = mode.reference.at(0.0, p)
+    except ModegraphError as error:
+        raise ModegraphError(f"{owner}, {error}") from error
+    return call_numeric(mode.start, {"r": r}, role="start", owner=owner)  # type: ignore[arg-type]
+
+
+def require_same(start: Set, again: Set, owner: str) -> None:
+    """An error, which begins with ``owner``, where ``start`` returned another set when it was called again."""
+    from modegraph.expression.repeatable import impure
+
+    same = start == again
+    if isinstance(start, Sublevel) and isinstance(again, Sublevel):
+        same = start.level == again.level and start.is_lower_level_of(again)
+    if not same:
+        raise impure(f"{owner}, start", f"called twice with the same reference, it gave {start!r} and then {again!r}")
 
 
 def checked_start(mode: Mode, start: Any, owner: str) -> Set:

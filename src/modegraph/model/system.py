@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from modegraph.errors import ModegraphError
+from modegraph.model.immutable import Replaceable
 from modegraph.model.names import names_of, require_callable, require_name
 from modegraph.model.sets import Box
 
 Names = str | int | Iterable[str]
 
 
-class System:
+class System(Replaceable):
     """A plant x' = dynamics(x, u, w, d).
 
     Parameters

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from modegraph.errors import ModegraphError
+from modegraph.model.immutable import Replaceable
 from modegraph.model.names import require_name
 from modegraph.model.sets import Set, Sublevel
 
 
-class Target:
+class Target(Replaceable):
     """A goal set: it can be entered, never left.
 
     Parameters

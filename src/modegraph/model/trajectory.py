@@ -65,6 +65,7 @@ class Trajectory(Reference):
         from modegraph.expression.array import TracedArray
         from modegraph.expression.derivative import derivative
         from modegraph.expression.piecewise import resolve
+        from modegraph.expression.repeatable import twice
         from modegraph.expression.simplify import simplify
         from modegraph.expression.trace import as_vector, call
 
@@ -73,8 +74,12 @@ class Trajectory(Reference):
             available["p"] = TracedArray(p)
         elif (own := self.find(p)) is not None:
             available["p"] = np.array(own)
-        value = call(self.signal, available, role="signal", owner=owner)
-        traced = as_vector(value, None, role="signal", owner=owner, graph=graph)
+
+        def read() -> list[Expr]:
+            value = call(self.signal, available, role="signal", owner=owner)
+            return as_vector(value, None, role="signal", owner=owner, graph=graph)
+
+        traced = twice(read, list, graph, f"{owner}, signal")
         if not traced:
             raise ModegraphError(f"{owner}: the signal returns no value; return at least one number")
 
@@ -122,6 +127,34 @@ class Trajectory(Reference):
                 (piece, Evaluator(compile_tape([*piece.value, *piece.dot, *piece.ddot], [time]))) for piece in pieces
             ]
         return self._tables[name]
+
+    def require_faithful(self, p: Floats | None, owner: str) -> None:
+        """Call the signal with plain numbers: it must return what its trace gives.
+
+        Raises
+        ------
+        ModegraphError
+            Begins with ``owner``.
+        """
+        from modegraph.expression.repeatable import Comparison, impure
+        from modegraph.expression.scalar import Graph
+        from modegraph.model.numeric import call_numeric
+
+        graph = Graph()
+        time = graph.variable("t")
+        for piece in self.pieces(graph, time, p, owner)[:-1]:
+            compare = Comparison(piece.value, [time])
+            for fraction in (0.29, 0.74):
+                t = piece.start + fraction * (piece.end - piece.start)
+                available: dict[str, object] = {"t": t} if p is None else {"t": t, "p": np.array(p)}
+                with np.errstate(all="ignore"):
+                    returned = call_numeric(self.signal, available, role="signal", owner=owner)
+                called = np.atleast_1d(np.asarray(returned, float))
+                wrong = None if called.shape != (len(piece.value),) else compare.first_wrong(np.array([t]), called)
+                if wrong is not None:
+                    traced = compare.values(np.array([t]))[0][wrong]
+                    what = f"at t = {t:.6g} entry {wrong} is {called[wrong]:.9g}, but its trace gives {traced:.9g}"
+                    raise impure(f"{owner}, signal", what)
 
     def __repr__(self) -> str:
         name = getattr(self.signal, "__name__", type(self.signal).__name__)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -18,32 +17,25 @@ from modegraph.model.trajectory import Trajectory, trajectory
 
 def with_horizon(mode: Mode, horizon: float | None) -> Mode:
     """The mode with a horizon of its own (None: that of ``build``)."""
-    changed = copy(mode)
-    changed.horizon = horizon
-    return changed
+    return mode.replace(horizon=horizon)
 
 
 def without_constraints(mode: Mode) -> Mode:
     """The mode with nothing to keep."""
-    changed = copy(mode)
-    changed.constraints = None
-    return changed
+    return mode.replace(constraints=None)
 
 
 def with_start(mode: Mode, p: Floats | None, start: Set) -> Mode:
     """The mode with this start set under the reference p; under its other references the start sets stay."""
-    changed = copy(mode)
     if len(mode.reference.parameters()) == 1:
-        changed.start = start
-        return changed
+        return mode.replace(start=start)
 
     def start_of(r: Any) -> Set:
         own = getattr(r, "p", None)
         own = np.atleast_1d(np.asarray(r, float)) if own is None else own
         return start if np.array_equal(own, np.asarray(p)) else mode_start(mode, own)
 
-    changed.start = start_of
-    return changed
+    return mode.replace(start=start_of)
 
 
 def with_set(target: Mode | Target, p: Floats | None, entered: Set) -> Mode | Target:
@@ -59,10 +51,8 @@ def narrowed(mode: Mode, members: list[Floats]) -> Mode:
     ModegraphError
         If they are none of its references.
     """
-    changed = copy(mode)
     listed = Points([np.asarray(mode.find(p)) for p in members])
-    changed.reference = _of_points(mode.reference, listed)
-    return changed
+    return mode.replace(reference=_of_points(mode.reference, listed))
 
 
 def _of_points(reference: Reference, points: Points) -> Reference:

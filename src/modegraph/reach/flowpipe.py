@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from modegraph.attach import with_methods
 from modegraph.cores import in_parallel, one_core
 from modegraph.deadline import NEVER, Deadline
 from modegraph.errors import ModegraphError
+from modegraph.model.faithful import require_faithful
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box, Set
 from modegraph.reach.compiled import CompiledMode, compile_mode
@@ -267,10 +267,10 @@ def flowpipe(
         raise ModegraphError(f"flowpipe takes a Mode, got {type(mode).__name__}; for several, call it for each")
     p = mode.find(r, whole=True)
     if start is not None:
-        mode = copy(mode)
-        mode.start = start
+        mode = mode.replace(start=start)
     label = f"mode {mode.label_of(p)!r}"
     end = _horizon(mode, horizon, label)
+    require_faithful(mode, p)
     compiled = compile_mode(mode, p, observed=False)
     with one_core():
         chains, stuck = Cutting(compiled, end).run()

@@ -39,6 +39,11 @@ def numeric(function: Callable[..., Any], owner: str, role: str) -> Function:
     return call
 
 
+def _no_input() -> Floats:
+    """The controller of a plant without inputs."""
+    return np.zeros(0)
+
+
 class Live:
     """The closed loop of ``mode`` under the reference ``p``.
 
@@ -58,7 +63,7 @@ class Live:
         self.p = p
         self.entered = entered
         self.n = mode.system.n
-        self._controller = numeric(mode.controller, owner, "controller")
+        self._controller = numeric(mode.controller or _no_input, owner, "controller")
         system = plant if isinstance(plant, System) else mode.system
         if isinstance(plant, System) and (plant.n != mode.system.n or plant.p != mode.system.p):
             raise ModegraphError(

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from modegraph.attach import with_methods
 from modegraph.errors import ModegraphError
+from modegraph.model.immutable import Immutable
 from modegraph.model.sets import exact
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ Face = tuple[exact.Row, Fraction]
 
 
 @with_methods
-class Set(ABC):
+class Set(Immutable, ABC):
     """A closed set of states, inputs or disturbances, convex unless it is a Sublevel; its doubles are exact numbers.
 
     Sets are immutable: their arrays are read-only copies of what was given.
@@ -73,7 +74,7 @@ class Set(ABC):
     def outline(self, dims: tuple[int, int]) -> Floats:
         """Corners, (k, 2) in order, of the projection onto two coordinates, for drawing."""
 
-    def settle(self, *dims: int) -> None:  # noqa: B027
+    def settle(self, *dims: int) -> None:
         """Take the first of these dimensions that fits, if the set does not know its own (only a Sublevel may not)."""
 
     def is_empty(self) -> bool:

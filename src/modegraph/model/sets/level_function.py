@@ -282,12 +282,18 @@ def _rational(op: int, a: Fraction, b: Fraction, const: Fraction) -> Fraction:
 def trace(fn: Callable[..., Any], graph: Graph, x: list[Expr]) -> Expr:
     """fn(x) as a traced scalar."""
     from modegraph.expression.array import TracedArray
+    from modegraph.expression.repeatable import twice
     from modegraph.expression.trace import as_vector, call
 
     array = TracedArray(x)
     array.flags.writeable = False
-    value = call(fn, {"x": array}, role=ROLE, owner="Sublevel")
-    entries = as_vector(value, None, role=ROLE, owner="Sublevel", graph=graph)
+
+    def read() -> list[Expr]:
+        return as_vector(
+            call(fn, {"x": array}, role=ROLE, owner="Sublevel"), None, role=ROLE, owner="Sublevel", graph=graph
+        )
+
+    entries = twice(read, list, graph, f"Sublevel, {ROLE}")
     if len(entries) != 1:
         raise ModegraphError(
             f"Sublevel, fn returned {len(entries)} entries, expected one number; "

@@ -75,7 +75,7 @@ class Sublevel(Set):
                 except ModegraphError as error:
                     problem = problem or error
                     continue
-                self._dim = dim
+                self.__dict__["_dim"] = dim
                 return
             assert problem is not None
             raise problem
@@ -118,7 +118,26 @@ class Sublevel(Set):
     @cached_property
     def _lowest(self) -> tuple[Floats, float]:
         point, value = lowest_point(self.function)
+        self._require_faithful(point)
         return frozen(point), value
+
+    def _require_faithful(self, around: Floats) -> None:
+        """Call fn with plain numbers at some points: it must return what its trace gives."""
+        from modegraph.expression.repeatable import Comparison, impure
+
+        compare = Comparison([self.function.root], self.function.x)
+        steps = np.random.default_rng(5).uniform(-0.1, 0.1, (3, len(around)))
+        for point in around + steps * (1.0 + np.abs(around)):
+            try:
+                with np.errstate(all="ignore"):
+                    called = np.asarray(self.fn(point.copy()), dtype=float).reshape(1)
+            except (ArithmeticError, ValueError):
+                continue
+            if compare.first_wrong(point, called) is not None:
+                place = ", ".join(f"{value:.6g}" for value in point)
+                there = compare.values(point)[0][0]
+                what = f"at x = ({place}) it is {called[0]:.9g}, but its trace gives {there:.9g}"
+                raise impure("Sublevel, fn", what)
 
     @property
     def center(self) -> Floats:
