@@ -14,7 +14,6 @@ from modegraph.certify.verdict import Unproved, Widths
 from modegraph.expression.evaluate import Evaluator
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.flow.framing import generator_box
 from modegraph.reach.tail.box import Tail
 
 Floats = NDArray[np.float64]
@@ -26,7 +25,7 @@ INSTANTS = 8
 def slack_until(flow: Flow, instant: int) -> dict[str, float]:
     """Proved slack of every constraint on [0, times[instant]]."""
     many: list[dict[str, float]] = []
-    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+    upper = flow.faces_at(flow.times[0], flow.set_at(0), flow.first_segment)
     many.append(_by_name(flow.fields[flow.first_segment].faces, upper))
     for step in flow.steps[:instant]:
         many.append(_by_name(flow.fields[step.segment].faces, step.face_upper))
@@ -68,7 +67,7 @@ def lasting(flows: Sequence[Flow], tail: Tail) -> SafetyProof:
 def unproved(flow: Flow, proved: int) -> Unproved | None:
     """The constraint that is not proved on the step after instant ``proved`` (-1: at the start)."""
     if proved < 0:
-        upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+        upper = flow.faces_at(flow.times[0], flow.set_at(0), flow.first_segment)
         names, when = flow.fields[flow.first_segment].faces, float(flow.times[0])
     else:
         step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
@@ -85,10 +84,9 @@ def width_over_time(flows: Sequence[Flow]) -> Widths | None:
     for flow in flows:
         count = len(flow.steps)
         for k in sorted({round(j * count / INSTANTS) for j in range(INSTANTS + 1)}):
-            p, G = flow.state_set(k)
-            lo, hi = flow.bounds.ranges(p)
+            lo, hi = flow.reach_set(k).ranges()
             times.append(float(flow.times[k]))
-            values.append(hi - lo + 2.0 * generator_box(G))
+            values.append(hi - lo)
     if not times:
         return None
     return Widths(tuple(flows[0].names), np.array(times), np.array(values))
@@ -99,17 +97,13 @@ def sampled_violation(flow: Flow) -> bool:
     fld = flow.fields[flow.steps[-1].segment if flow.steps else 0]
     if not fld.faces or not flow.piece.known:
         return False
-    p, G = flow.set_at(len(flow.steps))
     powers = sample_powers(flow.piece, flow.bounds.exponents)
-    inputs, _ = flow.variables_at(flow.time, p, G, fld)
+    inputs, _ = flow.variables_at(flow.time, flow.set_at(len(flow.steps)), fld)
     faces = Evaluator(fld.observed)(inputs @ powers.T)[: len(fld.faces)]
     return bool((faces > 0.0).any())
 
 
 def set_size(flow: Flow) -> float:
     """Half-width of the last set of a flow, in the state where it is largest relative to the starts (floats)."""
-    p, G = flow.state_set(len(flow.steps))
-    start, slack = flow.state_set(0)
-    own = np.abs(start[:, 1:]).sum(axis=1) + generator_box(slack)
-    now = np.abs(p[:, 1:]).sum(axis=1) + generator_box(G)
+    own, now = (np.abs(s.p[:, 1:]).sum(axis=1) + s.spread for s in (flow.reach_set(0), flow.last_set))
     return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))

@@ -183,13 +183,13 @@ class _Unit:
         if not candidates:
             return
         flow = compiled.flow(compiled.whole(), Order(1, 0) if compiled.linear else Order(4, 2))
-        if flow.failure is not None or not (flow.faces_at(0.0, flow.p0, flow.G0, 0) <= 0.0).all():
+        if flow.failure is not None or not (flow.faces_at(0.0, flow.set_at(0), 0) <= 0.0).all():
             return
         slack = slack_until(flow, 0)
         for k in candidates:
-            n, region = compiled.plant, self.goals[k].region
-            gauge = float(region.gauges(flow.bounds, flow.p0[None, :n], [flow.G0])[0])
-            nearest = Nearest(0.0, gauge, flow.bounds, flow.p0, flow.G0, np.zeros(n))
+            start = flow.reach_set(0).project(compiled.plant)
+            gauge = self.goals[k].region.gauge(start)
+            nearest = Nearest(0.0, gauge, start)
             self.verdicts[k] = self._switch(
                 k, SwitchProof(0.0, 0.0, max(0.0, 1.0 - gauge), 0.0, 0.0, slack, 1, nearest)
             )
