@@ -113,7 +113,7 @@ def test_a_box_counts(kind: str) -> None:
             assert inside
             assert region.binding(reach)[1] <= 1e-12
             proved += 1
-        assert way[0] >= region.gauge(reach)
+        assert way[0] >= region.gauge(reach) * (1 - 1e-12)
         assert way[1] == pytest.approx(region.gauge(plain))
         if not inside:
             assert not way[0] <= 1.0
