@@ -51,7 +51,7 @@ def chain(top: float) -> tuple[list[Flow], Sinking]:
     loop = SettledLoop(later.fields[-1], later.w_centre, later.w_radius, np.zeros(0), np.zeros(0))
     funnel = FunnelBuilder(loop).build(np.linspace(-0.4, 0.4, 21)[:, None], np.ones(1), lambda ball: False)
     assert isinstance(funnel, Funnel)
-    hit = funnel.enter(flows[1].bounds, *flows[1].state_set(len(flows[1].steps)))
+    hit = funnel.enter(flows[1].last_set)
     assert hit is not None
     return flows, Sinking(funnel, *hit, flows[1].time)
 

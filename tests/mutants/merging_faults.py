@@ -33,8 +33,8 @@ MERGING_FAULTS = (
     Fault(
         "parts that go on together are put around the first",
         RESTART,
-        "    sets = [(flow.bounds, *flow.state_set(len(flow.steps))) for flow in flows]\n",
-        "    sets = [(flow.bounds, *flow.state_set(len(flow.steps))) for flow in flows[:1]]\n",
+        "    sets = [flow.last_set for flow in flows]\n",
+        "    sets = [flow.last_set for flow in flows[:1]]\n",
         (TOGETHER,),
     ),
     Fault(

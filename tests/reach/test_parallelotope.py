@@ -15,40 +15,46 @@ from modegraph.reach.parallelotope import (
     slow_and_fast_axes,
     tightest,
 )
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.piece import whole
 
 TABLE = monomials((1, 1), 2)
 BOUNDS = PolynomialBounds(whole(mg.Box([0, 0], [1, 1]), []), TABLE, TABLE.size)
 
 
-def reach_set(seed: int, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """p, G and points of the set."""
+def reach_set(seed: int, scale: float = 1.0, box: float = 0.0) -> tuple[ReachSet, np.ndarray]:
+    """A set and points of it."""
     rng = np.random.default_rng(seed)
     p, G = rng.normal(size=(3, TABLE.size)) * scale, rng.normal(size=(4, 3, 3)) * 0.1 * scale
     xi = np.sign(rng.uniform(-1, 1, (200, 2))) * rng.choice([1.0, 0.4], (200, 2))
     powers = np.prod(xi[:, None, :] ** TABLE.exponents, axis=2)
     zeta = rng.choice([-1.0, 1.0], (200, 4))
-    return p, G, powers @ p.T + np.einsum("sg,gik,sk->si", zeta, G, powers[:, :3])
+    radius = np.full(3, box * scale)
+    e = rng.choice([-1.0, 1.0], (200, 3)) * radius
+    points = powers @ p.T + np.einsum("sg,gik,sk->si", zeta, G, powers[:, :3]) + e
+    return ReachSet.of(BOUNDS, p, G).plus_box(radius), points
 
 
+@pytest.mark.parametrize("box", [0.0, 5.0])
 @pytest.mark.parametrize("scale", [1e-150, 1.0, 1e150])
-def test_all_points_are_within_the_half_widths(scale: float) -> None:
-    p, G, points = reach_set(1, scale)
+def test_all_points_are_within_the_half_widths(scale: float, box: float) -> None:
+    reach, points = reach_set(1, scale, box)
     rng = np.random.default_rng(2)
-    frames = [np.eye(3), rng.normal(size=(3, 3)), principal_axes(BOUNDS, p, G)]
+    frames = [np.eye(3), rng.normal(size=(3, 3)), principal_axes(reach)]
+    centre = reach.p[:, 0]
     for axes in frames:
-        widths = half_widths(BOUNDS, p, G, axes, p[:, 0])
-        assert (widths * (1 + 1e-9) >= np.abs(np.linalg.solve(axes, (points - p[:, 0]).T)).T).all()
-    found = tightest([(BOUNDS, p, G)], frames, p[:, 0])
+        widths = half_widths(reach, axes, centre)
+        assert (widths * (1 + 1e-9) >= np.abs(np.linalg.solve(axes, (points - centre).T)).T).all()
+    found = tightest([reach], frames, centre)
     assert found is not None
     assert np.isfinite(found[1]).all()
 
 
 @pytest.mark.parametrize("axes", [np.zeros((3, 3)), np.ones((3, 3)), np.full((3, 3), np.nan)])
 def test_singular_frames_hold_nothing(axes: np.ndarray) -> None:
-    p, G, _ = reach_set(3)
-    assert np.isinf(half_widths(BOUNDS, p, G, axes, p[:, 0])).all()
-    assert tightest([(BOUNDS, p, G)], [axes], p[:, 0]) is None
+    reach, _ = reach_set(3)
+    assert np.isinf(half_widths(reach, axes, reach.p[:, 0])).all()
+    assert tightest([reach], [axes], reach.p[:, 0]) is None
 
 
 def test_modal_frames() -> None:

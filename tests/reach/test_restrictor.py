@@ -123,4 +123,4 @@ def test_constraints_are_proved_for_every_reference_of_a_class() -> None:
         )  # fmt: skip
         assert flow.run(2.0)
         assert bool(all((step.face_upper <= 0.0).all() for step in flow.steps)) == holds
-        assert (flow.faces_at(0.0, flow.p0, flow.G0, 0) >= 0.5 - limit - 1e-9).all()
+        assert (flow.faces_at(0.0, flow.set_at(0), 0) >= 0.5 - limit - 1e-9).all()

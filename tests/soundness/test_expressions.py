@@ -109,7 +109,7 @@ def enclosure(tree: Tree, lo: list[float], hi: list[float]) -> tuple[Flow, np.nd
         return None
     flow = Flow(c.fields, c.whole(), c.w_centre, c.w_radius, Order(3, 2), names=c.loop.names)
     with np.errstate(all="ignore"):
-        inputs, radius = flow.variables_at(0.0, flow.p0, flow.G0, c.fields[0])
+        inputs, radius = flow.variables_at(0.0, flow.set_at(0), c.fields[0])
         p, off, _ = flow.evaluate(c.fields[0].rates, inputs, radius)
     return flow, p[0], float(off[0])
 

@@ -67,7 +67,7 @@ def _outside_the_set(
 def _outside_the_tube(flow: Flow, k: int, found: Runs, i: int, powers: np.ndarray) -> list[str]:
     step = flow.steps[k]
     share = (found.times[i] - step.start) / (step.end - step.start)
-    p = (1.0 - share) * flow.set_at(k)[0] + share * step.p
+    p = (1.0 - share) * flow.set_at(k).p + share * step.p
     rounding = 1e-15 * powers.shape[0] * np.abs(p).sum(axis=1)[:, None]
     return _report(np.abs(found.x[i] - p @ powers) - flow.swell(step)[:, None] - found.error[i] - rounding, step.end)
 

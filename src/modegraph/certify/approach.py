@@ -10,7 +10,6 @@ from modegraph.certify.switching.base import Nearest
 from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Approach, Floats
 from modegraph.model.sets import Ball, Ellipsoid, Sublevel
-from modegraph.reach.flow.framing import generator_box
 
 OWN_SIZE = "times its size"
 """The unit of distances from an ellipsoid."""
@@ -20,8 +19,7 @@ def approach_of(nearest: Nearest | None, region: Region, names: Sequence[str]) -
     """What the nearest set of the worst part says of a target over the states ``names``; None where it is unbounded."""
     if nearest is None or not np.isfinite(nearest.gauge):
         return None
-    n = region.dim
-    face, missing = region.binding(nearest.bounds, nearest.p[:n], nearest.G[:, :n], nearest.lost[:n])
+    face, missing = region.binding(nearest.set.project(region.dim))
     if not np.isfinite(missing):
         return None
     words, unit, scale = face_in_words(region, face, names)
@@ -33,10 +31,9 @@ def _farthest(nearest: Nearest, region: Region, names: Sequence[str]) -> str:
     target, n = region.set, region.dim
     if not isinstance(target, Ball | Ellipsoid):
         return ""
-    lo, hi = nearest.bounds.ranges(nearest.p[:n])
-    spread = generator_box(nearest.G[:, :n]) + nearest.lost[:n]
+    lo, hi = nearest.set.project(n).ranges()
     c = np.asarray(target.c, float)
-    out = np.maximum(hi + spread - c, c - lo + spread)
+    out = np.maximum(hi - c, c - lo)
     allowed = np.full(n, target.radius) if isinstance(target, Ball) else np.sqrt(np.diag(np.asarray(target.shape)))
     k = int(np.argmax(out / np.maximum(allowed, 1e-300)))
     return f"{names[k]} up to {out[k]:.4g} from its centre, where {allowed[k]:.4g} is allowed"

@@ -87,7 +87,7 @@ class Exploration:
         elif cut_short:
             pieces = piece.split(nonlinear_variable(flow))
         else:
-            pieces = piece.split(widest_variable(flow.bounds, flow.set_at(0)[0]))
+            pieces = piece.split(widest_variable(flow.set_at(0)))
         share = allowance // max(1, len(pieces))
         if not share:
             return found

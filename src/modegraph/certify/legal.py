@@ -12,7 +12,6 @@ from modegraph.certify.verdict import Unproved, Widths
 from modegraph.expression.evaluate import Evaluator
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.flow.framing import generator_box
 
 Floats = NDArray[np.float64]
 
@@ -27,14 +26,14 @@ def proved_instants(flow: Flow) -> int:
     """
     if flow.failure is not None and not flow.steps:
         return -1
-    if not (flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment) <= 0.0).all():
+    if not (flow.faces_at(flow.times[0], flow.set_at(0), flow.first_segment) <= 0.0).all():
         return -1
     for k, step in enumerate(flow.steps):
         if not (step.face_upper <= 0.0).all():
             return k
         fld = flow.fields[step.segment]
         if step.end >= fld.end and step.segment + 1 < len(flow.fields):
-            after = flow.faces_at(step.end, step.p, step.G, step.segment + 1)
+            after = flow.faces_at(step.end, flow.set_at(k + 1), step.segment + 1)
             if not (after <= 0.0).all():
                 return k
     return len(flow.steps)
@@ -42,7 +41,7 @@ def proved_instants(flow: Flow) -> int:
 
 def slack_until(flow: Flow, instant: int) -> dict[str, float]:
     """Proved slack of every constraint on [0, times[instant]]."""
-    upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+    upper = flow.faces_at(flow.times[0], flow.set_at(0), flow.first_segment)
     least = by_name(flow.fields[flow.first_segment].faces, upper)
     for step in flow.steps[:instant]:
         for name, value in by_name(flow.fields[step.segment].faces, step.face_upper).items():
@@ -80,13 +79,14 @@ def unproved(flow: Flow, proved: int) -> Unproved | None:
     """The constraint that is not proved on the step after instant ``proved`` (-1: at the start), or with the inputs
     behind a breakpoint at its end; None where all are, and only the flow does not go on."""
     if proved < 0:
-        upper = flow.faces_at(flow.times[0], flow.p0, flow.G0, flow.first_segment)
+        upper = flow.faces_at(flow.times[0], flow.set_at(0), flow.first_segment)
         names, when = flow.fields[flow.first_segment].faces, float(flow.times[0])
     else:
-        step = flow.steps[proved] if proved < len(flow.steps) else flow.steps[-1]
+        index = min(proved, len(flow.steps) - 1)
+        step = flow.steps[index]
         upper, names, when = step.face_upper, flow.fields[step.segment].faces, step.start
         if (upper <= 0.0).all() and step.segment + 1 < len(flow.fields):
-            upper = flow.faces_at(step.end, step.p, step.G, step.segment + 1)
+            upper = flow.faces_at(step.end, flow.set_at(index + 1), step.segment + 1)
             names, when = flow.fields[step.segment + 1].faces, step.end
     if (upper <= 0.0).all():
         return None
@@ -100,10 +100,9 @@ def width_over_time(flows: Sequence[Flow]) -> Widths | None:
     for flow in flows:
         count = len(flow.steps)
         for k in sorted({round(j * count / INSTANTS) for j in range(INSTANTS + 1)}):
-            p, G = flow.state_set(k)
-            lo, hi = flow.bounds.ranges(p)
+            lo, hi = flow.reach_set(k).ranges()
             times.append(float(flow.times[k]))
-            values.append(hi - lo + 2.0 * generator_box(G))
+            values.append(hi - lo)
     if not times:
         return None
     return Widths(tuple(flows[0].names), np.array(times), np.array(values))
@@ -114,17 +113,13 @@ def sampled_violation(flow: Flow) -> bool:
     fld = flow.fields[flow.steps[-1].segment if flow.steps else 0]
     if not fld.faces or not flow.piece.known:
         return False
-    p, G = flow.set_at(len(flow.steps))
     powers = sample_powers(flow.piece, flow.bounds.exponents)
-    inputs, _ = flow.variables_at(flow.time, p, G, fld)
+    inputs, _ = flow.variables_at(flow.time, flow.set_at(len(flow.steps)), fld)
     faces = Evaluator(fld.observed)(inputs @ powers.T)[: len(fld.faces)]
     return bool((faces > 0.0).any())
 
 
 def set_size(flow: Flow) -> float:
     """Half-width of the last set of a flow, in the state where it is largest relative to the starts (floats)."""
-    p, G = flow.state_set(len(flow.steps))
-    start, slack = flow.state_set(0)
-    own = np.abs(start[:, 1:]).sum(axis=1) + generator_box(slack)
-    now = np.abs(p[:, 1:]).sum(axis=1) + generator_box(G)
+    own, now = (np.abs(s.p[:, 1:]).sum(axis=1) + s.spread for s in (flow.reach_set(0), flow.last_set))
     return float((now / np.maximum(own, 1e-3 * own.max(initial=1e-300))).max(initial=0.0))

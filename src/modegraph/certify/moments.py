@@ -7,7 +7,7 @@ unknowns, disturbance - is in the spread s, which is bounded in the terms of a t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,9 @@ from modegraph.certify.legal import proved_instants
 from modegraph.certify.targets.family import TargetClass
 from modegraph.enclosure.rounding import UNIT
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.quadric import Quadric, generator_sizes
+from modegraph.reach.generators import generator_sizes
+from modegraph.reach.quadric import Quadric
+from modegraph.reach.reach_set import ReachSets
 from modegraph.reach.start.class_chart import parameters_of, scale_of
 
 Floats = NDArray[np.float64]
@@ -108,9 +110,8 @@ def moments_of(
     if usable < first:
         return None
     instants = np.unique(np.round(np.linspace(first, usable, MOST_INSTANTS)).astype(np.int64))
-    sets = [flow.state_set(k) for k in instants]
-    p = np.stack([x[:n] for x, _ in sets])
-    G = [g[:, :n] for _, g in sets]
+    sets = ReachSets.of(flow.bounds, [flow.reach_set(k).project(n) for k in instants.tolist()], n)
+    p = sets.p
     rest = p.copy()
     rest[:, :, pure] = 0.0
     lo, hi = np.full(parameters, -np.inf), np.full(parameters, np.inf)
@@ -126,8 +127,8 @@ def moments_of(
         lo, hi, all(lo[k] <= least and most <= hi[k] for k, (least, most) in enumerate(classes)),
         flow.times[instants], np.array([_energy(flow, int(k)) for k in instants]), middle, scale, powers[used],
         np.ascontiguousarray(rows[:, :, used]),
-        np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(flow, target, rest, G),
-        float(np.abs(p).sum(axis=2).max() + max(np.abs(g).sum() for g in G)),
+        np.abs(p[:, :, pure]).sum(axis=2) @ np.abs(target.rows).T, _spreads(target, replace(sets, p=rest)),
+        float(np.abs(p).sum(axis=2).max() + max(np.abs(G).sum() for G in sets.generators) + sets.box.sum()),
     )  # fmt: skip
 
 
@@ -139,22 +140,24 @@ def _energy(flow: Flow, k: int) -> float:
     return float(np.nextafter(flow.seen_bounds.upper(step.energy) + step.energy_radius, np.inf))
 
 
-def _spreads(flow: Flow, target: TargetClass, rest: Floats, G: Sequence[Floats]) -> Floats:
+def _spreads(target: TargetClass, rest: ReachSets) -> Floats:
     """(K, 1) gauges of a round target, or (K, f) reaches along the rows of a flat one, of m = 0."""
     if target.round:
         quadric = Quadric(np.zeros(target.dim), target.rows, target.grow)
         # Each set in a unit of its own, a power of two: the squares of tiny lengths would be 0.
-        size = [max(float(np.abs(p).max()), float(np.abs(g).max(initial=0.0))) for p, g in zip(rest, G, strict=True)]
+        largest = [float(np.abs(g).max(initial=0.0)) for g in rest.generators]
+        size = np.maximum(np.maximum(np.abs(rest.p).max(axis=(1, 2)), rest.box.max(axis=1)), largest)
         exponent = np.frexp(size)[1]
-        scaled = quadric.gauges(
-            flow.bounds,
-            np.ldexp(rest, -exponent[:, None, None]),
-            [np.ldexp(g, -e) for g, e in zip(G, exponent, strict=True)],
+        scaled = ReachSets(
+            rest.bounds,
+            np.ldexp(rest.p, -exponent[:, None, None]),
+            [np.ldexp(g, -e) for g, e in zip(rest.generators, exponent, strict=True)],
+            np.ldexp(rest.box, -exponent[:, None]),
         )
-        return np.nextafter(np.ldexp(scaled, exponent), np.inf)[:, None]
-    z = generator_sizes(target.rows, G)
-    size = np.abs(rest).sum(axis=2) @ np.abs(target.rows).T + z
-    return np.asarray(flow.bounds.upper(np.einsum("fi,kij->kfj", target.rows, rest)) + z + 64.0 * UNIT * size)
+        return np.nextafter(np.ldexp(quadric.gauges(scaled), exponent), np.inf)[:, None]
+    z = generator_sizes(target.rows, rest.generators) + rest.box @ np.abs(target.rows).T
+    size = np.abs(rest.p).sum(axis=2) @ np.abs(target.rows).T + z
+    return np.asarray(rest.bounds.upper(np.einsum("fi,kij->kfj", target.rows, rest.p)) + z + 64.0 * UNIT * size)
 
 
 def at_state(x: Floats, target: TargetClass) -> Moments:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.reach.reach_set import ReachSets
 from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,11 @@ def sample_variables(piece: Piece) -> Floats:
         found = piece.points if piece.known else np.zeros((1, piece.chart.free))
         eta[:, : piece.chart.free] = found[np.arange(SAMPLES) % len(found)]
     return eta
+
+
+def points_of(sets: ReachSets, eta: Floats) -> Floats:
+    """Points (K, S, n) of the polynomial parts at scaled variables (S, m)."""
+    return np.asarray(np.einsum("kin,sn->ksi", sets.p, powers_at(eta, sets.bounds.exponents)))
 
 
 def sample_powers(piece: Piece, exponents: NDArray[np.int64]) -> Floats:

@@ -180,7 +180,7 @@ class _Unit:
         if not candidates:
             return
         flow = compiled.flow(compiled.whole(), Order(1, 0) if compiled.linear else Order(4, 2))
-        if flow.failure is not None or not (flow.faces_at(0.0, flow.p0, flow.G0, 0) <= 0.0).all():
+        if flow.failure is not None or not (flow.faces_at(0.0, flow.set_at(0), 0) <= 0.0).all():
             return
         for k in candidates:
             evidence = InZeroTime(compiled.one_start, flow, self.goals[k].region)

@@ -25,8 +25,9 @@ from modegraph.reach.cover.ladder import class_orders, is_light, orders
 from modegraph.reach.cover.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
 from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import Order
+from modegraph.reach.flow.slices import Slicer, hull, outline
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.restrictor import Restrictor
-from modegraph.reach.slices import Slice, Slicer, hull, outline
 from modegraph.reach.start.piece import Piece
 
 if TYPE_CHECKING:
@@ -227,11 +228,11 @@ class Flowpipe:
         return f"Flowpipe({self._label}, until={until}, complete={self.complete})"
 
 
-def _slices(slicers: Sequence[Slicer], a: float, b: float) -> list[Slice]:
+def _slices(slicers: Sequence[Slicer], a: float, b: float) -> list[ReachSet]:
     """Slices in [a, b]; at an instant where a flow continues another, of the other."""
     if a == b:
         return [s.at(a) for s in slicers if s.times[0] < a <= s.times[-1] or a == s.times[0] == 0.0]
-    found: list[Slice] = []
+    found: list[ReachSet] = []
     for slicer in slicers:
         begin, end = max(a, float(slicer.times[0])), min(b, float(slicer.times[-1]))
         if begin < end:
@@ -421,7 +422,7 @@ class Cutting:
 
 def _end_widths(parts: Sequence[_Part]) -> Floats:
     """Widths (n,) of the box around the ends of all parts."""
-    boxes = [part.chain.flows[-1].end_box() for part in parts]
+    boxes = [part.chain.flows[-1].last_set.ranges() for part in parts]
     return np.asarray(np.max([hi for _, hi in boxes], axis=0) - np.min([lo for lo, _ in boxes], axis=0))
 
 

@@ -8,21 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import UNIT
-from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.flow.flow import generator_box
 from modegraph.reach.inverse import near_inverse
+from modegraph.reach.reach_set import ReachSet
 
 Floats = NDArray[np.float64]
 
 
-def half_widths(bounds: PolynomialBounds, p: Floats, G: Floats, axes: Floats, centre: Floats) -> Floats:
-    """Bounds (k,) of |V^-1 (x - centre)| over the set p(xi) + sum_g G_g(xi) zeta_g in k coordinates.
+def half_widths(reach: ReachSet, axes: Floats, centre: Floats) -> Floats:
+    """Bounds (k,) of |V^-1 (x - centre)| over a set in k coordinates.
 
     ``axes`` V (k, k). With any N near V^-1 and R = N V - I, V^-1 y = (I + R)^-1 N y, so the bound of
     N y grows by |R| / (1 - |R|) of its largest entry. Infinite where V is too close to singular.
     """
-    k = len(p)
-    if not (np.isfinite(axes).all() and np.isfinite(p).all() and np.isfinite(G).all()):
+    p, G, k = reach.p, reach.G, reach.dim
+    if not (np.isfinite(axes).all() and reach.is_finite):
         return np.full(k, np.inf)
     found = near_inverse(axes)
     if found is None:
@@ -32,12 +31,13 @@ def half_widths(bounds: PolynomialBounds, p: Floats, G: Floats, axes: Floats, ce
         return np.full(k, np.inf)
     shifted = p.copy()
     shifted[:, 0] -= centre
-    size = np.abs(p).sum(axis=1) + np.abs(centre) + generator_box(G)
+    size = np.abs(p).sum(axis=1) + np.abs(centre) + reach.spread
     q = N @ shifted
     spread = np.abs(np.einsum("fi,gin->fgn", N, G)).sum(axis=(1, 2)) * (1.0 + 4.0 * (G.size + 4) * UNIT)
-    reach = np.maximum(bounds.upper(q), bounds.upper(-q)) + spread
-    reach = reach + 8.0 * (k + 4) * UNIT * (np.abs(N) @ size)
-    return np.asarray((reach + 2.0 * off * reach.max(initial=0.0)) * (1.0 + 4.0 * UNIT))
+    spread = spread + np.abs(N) @ reach.box
+    far = np.maximum(reach.bounds.upper(q), reach.bounds.upper(-q)) + spread
+    far = far + 8.0 * (k + 4) * UNIT * (np.abs(N) @ size)
+    return np.asarray((far + 2.0 * off * far.max(initial=0.0)) * (1.0 + 4.0 * UNIT))
 
 
 def modal_axes(slope: Floats) -> Floats:
@@ -94,28 +94,23 @@ def _eigenvectors(slope: Floats) -> Floats | None:
     return axes if np.isfinite(axes).all() else None
 
 
-def principal_axes(bounds: PolynomialBounds, p: Floats, G: Floats) -> Floats:
+def principal_axes(reach: ReachSet) -> Floats:
     """Principal directions of the linear part and the generators."""
-    vectors = np.hstack([bounds.linear_part(p), G[:, :, 0].T])
+    vectors = np.hstack([reach.bounds.linear_part(reach.p), reach.G[:, :, 0].T])
     if not np.isfinite(vectors).all():
-        return np.eye(len(p))
+        return np.eye(reach.dim)
     scale = np.maximum(np.abs(vectors).sum(axis=1), 1e-300)
     U = np.linalg.svd(vectors / scale[:, None], full_matrices=True)[0]
     axes = U * scale[:, None]
     return np.asarray(axes / np.linalg.norm(axes, axis=0))
 
 
-def tightest(
-    sets: Sequence[tuple[PolynomialBounds, Floats, Floats]], candidates: Sequence[Floats], centre: Floats
-) -> tuple[Floats, Floats] | None:
-    """(axes, half-widths) of the candidate frame whose parallelotope around the sets is smallest.
-
-    Each set is (bounds, p, G) as in `half_widths`.
-    """
+def tightest(sets: Sequence[ReachSet], candidates: Sequence[Floats], centre: Floats) -> tuple[Floats, Floats] | None:
+    """(axes, half-widths) of the candidate frame whose parallelotope around the sets is smallest."""
     best: tuple[Floats, Floats] | None = None
     least = np.inf
     for axes in candidates:
-        widths = np.max([half_widths(bounds, p, G, axes, centre) for bounds, p, G in sets], axis=0)
+        widths = np.max([half_widths(reach, axes, centre) for reach in sets], axis=0)
         if not np.isfinite(widths).all():
             continue
         volume = float(np.log(np.maximum(widths, 1e-300)).sum() + np.log(max(abs(np.linalg.det(axes)), 1e-300)))

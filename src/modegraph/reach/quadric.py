@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.enclosure.polynomial import generator_reach
 from modegraph.enclosure.rounding import UNIT
 from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.generators import generator_sizes
+from modegraph.reach.reach_set import ReachSet, ReachSets
 
 Floats = NDArray[np.float64]
 
@@ -25,11 +25,21 @@ class Quadric:
         self.centre, self.T, self.grow = centre, T, grow
         self.dim = len(centre)
 
-    def gauges(self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats]) -> Floats:
-        """Upper bounds (K,) over the sets {p_k(xi) + sum_g G_kg(xi) zeta_g}.
+    def gauge(self, reach: ReachSet) -> float:
+        """Upper bound over one set."""
+        return float(self.gauges(ReachSets.one(reach))[0])
 
-        p (K, n, N) over the variables of ``bounds``, finite; generators: K arrays (g, n, Nq).
-        """
+    def gauges(self, sets: ReachSets) -> Floats:
+        """Upper bounds (K,) over sets that are finite."""
+        gauges = self._of_zonotopes(sets.bounds, sets.p, sets.generators)
+        return np.nextafter(gauges + self.box_gauges(sets.box), np.inf) if sets.box.any() else gauges
+
+    def box_gauges(self, radius: Floats) -> Floats:
+        """What adding boxes of radii (K, n) can add to the gauge."""
+        y = radius @ np.abs(self.T).T
+        return np.asarray(np.sqrt((y**2).sum(axis=1)) * self.grow * (1.0 + 8.0 * (self.dim + 4) * UNIT))
+
+    def _of_zonotopes(self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats]) -> Floats:
         gauge = self._gauges(bounds, p, generators, [self.T] * len(p))
         # The norm does not change under a rotation, but boxes around zonotopes do: try their own axes too.
         # They gain at most the square root of n: nothing, where that would not bring a set to the least.
@@ -127,16 +137,3 @@ def largest_singular_value(Y: Floats) -> Floats:
     bound = np.sqrt(top / (1.0 - np.minimum(miss, 0.5))) * (1.0 + 8.0 * UNIT)
     frobenius = np.sqrt(size) * (1.0 + 4.0 * (b * Y.shape[1] + 2) * UNIT)
     return np.asarray(np.where(miss < 0.5, np.fmin(bound, frobenius), frobenius))
-
-
-def generator_sizes(A: Floats, generators: Sequence[Floats]) -> Floats:
-    """(K, f): sum_g |A G_kg|_1 for each row of A, rounded up."""
-    n = A.shape[1]
-    A = np.array(A)
-    out = np.zeros((len(generators), len(A)))
-    for k, G in enumerate(generators):
-        if len(G):
-            reach, size = generator_reach(A, np.ascontiguousarray(G))
-            slack = 4.0 * (n + 2 + math.log2(G.size + 1)) * UNIT * (np.abs(A) @ size)
-            out[k] = reach * (1.0 + 2.0 * G.size * UNIT) + slack
-    return out

@@ -1,4 +1,4 @@
-"""One reference of a class flowpipe: its polynomials with the parameters fixed."""
+"""One reference of a class flowpipe: its reach sets with the parameters fixed."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 from modegraph.model.class_start import StartClass
 from modegraph.model.mode import Mode
 from modegraph.model.start import mode_start
+from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.compiled import CompiledMode
-from modegraph.reach.flow.flow import Flow
-from modegraph.reach.slices import Slice
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.class_chart import require_same_start
-from modegraph.reach.substitution import Substitution, holds
+from modegraph.reach.start.substitution import Substitution, holds
 
 Floats = NDArray[np.float64]
 
 
 class Restrictor:
-    """Restricts slices of the flows of a mode with a continuous class of references to one of them."""
+    """Restricts reach sets of a mode with a continuous class of references to one of them."""
 
     def __init__(self, mode: Mode, compiled: CompiledMode) -> None:
         self._mode = mode
@@ -44,15 +44,14 @@ class Restrictor:
             self._checked.add(p.tobytes())
         return p
 
-    def restricted(self, slices: Sequence[Slice], p: Floats) -> list[Slice]:
-        """Slices of the pieces that hold p, with the parameters fixed."""
-        known: dict[Flow, Substitution] = {}
+    def restricted(self, sets: Sequence[ReachSet], p: Floats) -> list[ReachSet]:
+        """Sets over the pieces that hold p, with the parameters fixed."""
+        known: dict[PolynomialBounds, Substitution] = {}
         found = []
-        for s in slices:
-            flow = s.slicer.flow
-            if not holds(flow.piece, p):
+        for reach in sets:
+            if not holds(reach.piece, p):
                 continue
-            if flow not in known:
-                known[flow] = Substitution(flow, p)
-            found.append(Slice(s.slicer, *known[flow](s.p, s.out)))
+            if reach.bounds not in known:
+                known[reach.bounds] = Substitution(reach.bounds, p)
+            found.append(known[reach.bounds](reach))
         return found

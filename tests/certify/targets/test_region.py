@@ -11,6 +11,7 @@ from modegraph.enclosure.monomials import monomials
 from modegraph.model.sets import Set
 from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.quadric import largest_singular_value
+from modegraph.reach.reach_set import ReachSet, ReachSets
 from modegraph.reach.start.piece import whole
 
 SCALES = [1e-150, 1e-3, 1.0, 1e150]
@@ -33,7 +34,7 @@ def gauge(region: Region, start: mg.Box) -> float:
     p, _, slack = piece.polynomials(table.linear, table.size)
     G = np.zeros((2, 2, 1))
     G[[0, 1], [0, 1], 0] = slack
-    return float(region.gauges(PolynomialBounds(piece, table, table.size), p[None], [G])[0])
+    return region.gauge(ReachSet.of(PolynomialBounds(piece, table, table.size), p, G))
 
 
 @pytest.mark.parametrize("scale", SCALES)
@@ -81,13 +82,42 @@ def test_a_remainder_counts(kind: str) -> None:
     rng = np.random.default_rng(4)
     proved = 0
     for _ in range(300):
-        p = np.zeros((1, 2, table.size))
-        p[0, :, 0] = np.array([1.0, -2.0]) + rng.uniform(-0.3, 0.3, 2)
+        p = np.zeros((2, table.size))
+        p[:, 0] = np.array([1.0, -2.0]) + rng.uniform(-0.3, 0.3, 2)
         G = rng.normal(size=(3, 2, 1)) * float(rng.choice([0.01, 0.1, 0.3]))
-        if region.gauges(bounds, p, [G])[0] <= 1.0:
+        if region.gauge(ReachSet.of(bounds, p, G)) <= 1.0:
             corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T @ G[:, :, 0]
-            assert all(target.contains(p[0, :, 0] + corner * (1 - 1e-12)) for corner in corners)
+            assert all(target.contains(p[:, 0] + corner * (1 - 1e-12)) for corner in corners)
             proved += 1
+    assert proved >= 5
+
+
+@pytest.mark.parametrize("kind", sets(1.0))
+def test_a_box_counts(kind: str) -> None:
+    """At instants, on the way between two, and in what is missing: a point with a box is where its corners are."""
+    target = sets(1.0)[kind]
+    region, piece, table = Region(target), whole(mg.Box([0, 0], [1, 1]), []), monomials((1, 1), 1)
+    bounds = PolynomialBounds(piece, table, table.size)
+    rng = np.random.default_rng(4)
+    proved = 0
+    for _ in range(300):
+        p = np.zeros((2, table.size))
+        p[:, 0] = np.array([1.0, -2.0]) + rng.uniform(-0.3, 0.3, 2)
+        box = rng.uniform(size=2) * float(rng.choice([0.01, 0.1, 0.3]))
+        plain = ReachSet.of(bounds, p)
+        reach = plain.plus_box(box)
+        corners = [p[:, 0] + box * np.array([a, b]) * (1 - 1e-12) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+        inside = all(target.contains(corner) for corner in corners)
+        way = region.tube_gauges(ReachSets.of(bounds, [reach, plain, plain], 2), np.zeros((2, 2)))
+        if region.gauge(reach) <= 1.0:
+            assert inside
+            assert region.binding(reach)[1] <= 1e-12
+            proved += 1
+        assert way[0] >= region.gauge(reach) * (1 - 1e-12)
+        assert way[1] == pytest.approx(region.gauge(plain))
+        if not inside:
+            assert not way[0] <= 1.0
+            assert region.binding(reach)[1] > -1e-12
     assert proved >= 5
 
 
@@ -120,8 +150,8 @@ def test_what_is_not_finite_proves_nothing() -> None:
         piece = whole(mg.Box([0, 0], [1, 1]), [])
         table = monomials((1, 1), 1)
         bounds = PolynomialBounds(piece, table, table.size)
-        p = np.full((1, 2, table.size), np.nan)
-        assert not region.gauges(bounds, p, [np.zeros((0, 2, 1))])[0] <= 1.0
+        p = np.full((2, table.size), np.nan)
+        assert not region.gauge(ReachSet.of(bounds, p)) <= 1.0
 
 
 def test_largest_singular_value() -> None:

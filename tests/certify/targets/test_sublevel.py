@@ -20,6 +20,7 @@ from modegraph.model.sets import Set
 from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.reach_set import ReachSet, ReachSets
 from modegraph.reach.start.piece import whole
 
 C, R, U = Status.CERTIFIED, Status.REFUTED, Status.UNDECIDED
@@ -49,8 +50,8 @@ def gauge(region: SublevelRegion, start: Set, G: np.ndarray | None = None, lost:
     box[[0, 1], [0, 1], 0] = slack
     every = box if G is None else np.concatenate([box, G[:, :, None]])
     bounds = PolynomialBounds(piece, table, table.size)
-    radius = np.zeros((1, 2)) if lost is None else np.array([lost])
-    return float(region.swollen_gauges(bounds, p[None], [every], radius)[0])
+    radius = np.zeros(2) if lost is None else np.array(lost)
+    return region.gauge(ReachSet(bounds, p, every, radius))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -199,5 +200,21 @@ def test_the_window_does_not_rest_on_convexity() -> None:
     assert crossings[0].time == 0.0
     assert crossings[0].window <= 0.5
     ends = np.stack([np.array([[-1.0], [0.0]]), np.array([[1.0], [0.0]])])
-    assert region.gauges(flow.bounds, ends, [np.zeros((0, 2, 1))] * 2).max() <= 1.0
-    assert region.tube_gauges(flow.bounds, ends, np.zeros((1, 2)))[0] > 1.0
+    sets = ReachSets.of(flow.bounds, [ReachSet.of(flow.bounds, p) for p in ends], 2)
+    assert region.gauges(sets).max() <= 1.0
+    assert region.tube_gauges(sets, np.zeros((1, 2)))[0] > 1.0
+
+
+def test_the_boxes_of_sets_count_on_the_way_too() -> None:
+    region = region_of("norm")
+    piece, table = whole(mg.Box([0, 0], [1, 1]), []), monomials((1, 1), 1)
+    bounds = PolynomialBounds(piece, table, table.size)
+    p = np.zeros((2, table.size))
+    p[0, 0] = 0.5
+    plain = ReachSet.of(bounds, p)
+    for size, inside in ((0.4, True), (0.6, False)):
+        reach = plain.plus_box(np.array([size, 0.0]))
+        assert (region.gauge(reach) <= 1.0) == inside
+        for order in ([reach, plain], [plain, reach]):
+            gauges = region.tube_gauges(ReachSets.of(bounds, order, 2), np.zeros((1, 2)))
+            assert (gauges[0] <= 1.0) == inside

@@ -61,7 +61,7 @@ def chain() -> Chain:
 
 def extremes(flow: Flow) -> np.ndarray:
     """Points of the last set of a flow, far out in many directions."""
-    p, G = flow.state_set(len(flow.steps))
+    p, G = flow.last_set.p, flow.last_set.G
     linear = flow.bounds.linear_part(p)
     found = []
     for d in np.random.default_rng(4).normal(size=(200, len(p))):

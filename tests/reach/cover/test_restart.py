@@ -13,8 +13,8 @@ import modegraph as mg
 from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.restart import filled_share, restarted
-from modegraph.reach.flow.flow import Flow, Order, generator_box
-from modegraph.reach.substitution import Substitution
+from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.start.substitution import Substitution
 from tests.soundness.families import pushed, references, runs
 
 LO, HI = np.array([0.4, -0.1]), np.array([0.6, 0.1])
@@ -39,7 +39,7 @@ def flow_of(compiled: CompiledMode, piece: Any, steps: int) -> Flow:
 
 
 def points(flow: Flow) -> np.ndarray:
-    p, G = flow.state_set(len(flow.steps))
+    p, G = flow.last_set.p, flow.last_set.G
     rng = np.random.default_rng(1)
     xi = rng.choice([-1.0, 1.0, 0.5], (100, flow.piece.variables))
     powers = np.prod(xi[:, None, :] ** flow.table.exponents, axis=2)
@@ -49,7 +49,7 @@ def points(flow: Flow) -> np.ndarray:
 
 def extremes(flow: Flow) -> np.ndarray:
     """Points of the last set, far out in many directions."""
-    p, G = flow.state_set(len(flow.steps))
+    p, G = flow.last_set.p, flow.last_set.G
     linear = flow.bounds.linear_part(p)
     found = []
     for d in np.random.default_rng(2).normal(size=(50, len(p))):
@@ -60,7 +60,7 @@ def extremes(flow: Flow) -> np.ndarray:
 
 
 def holds(flow: Flow, x: np.ndarray) -> None:
-    p, G = flow.state_set(0)
+    p, G = flow.reach_set(0).p, flow.reach_set(0).G
     for d in np.random.default_rng(2).normal(size=(50, x.shape[1])):
         top = (
             float(flow.bounds.upper(d @ p)) + np.abs(d @ G[:, :, 0].T).sum()
@@ -124,7 +124,7 @@ def test_a_chain_holds_trajectories_under_switched_disturbances(compiled: Compil
     chain = Chain(compiled, compiled.whole(), Order(3, 2))
     assert chain.run(1.5), chain.failure
     flow = chain.flows[-1]
-    lo, hi = flow.end_box()
+    lo, hi = flow.last_set.ranges()
     rng = np.random.default_rng(3)
     for _ in range(12):
         x, w = rng.choice([LO, HI], axis=0).astype(float), rng.choice([-1.0, 1.0])
@@ -137,10 +137,7 @@ def test_a_chain_holds_trajectories_under_switched_disturbances(compiled: Compil
 
 def ends_at(flow: Flow, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quick box of the last set of one reference."""
-    polynomial, G = flow.state_set(len(flow.steps))
-    fixed, out = Substitution(flow, p)(polynomial, generator_box(G))
-    lo, hi = flow.bounds.ranges(fixed)
-    return lo - out, hi + out
+    return Substitution(flow.bounds, p)(flow.last_set).ranges()
 
 
 def test_a_restart_keeps_what_depends_on_the_reference() -> None:

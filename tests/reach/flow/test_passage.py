@@ -13,9 +13,9 @@ from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.flow import passage as module
 from modegraph.reach.flow.flow import Flow, Order
-from modegraph.reach.flow.framing import generator_box
 from modegraph.reach.flow.own_time import in_own_time
 from modegraph.reach.flow.records import Step
+from modegraph.reach.generators import generator_box
 
 TOLERANCE = 1e-8
 
@@ -99,7 +99,7 @@ def assert_holds(flow: Flow, made: mg.Mode, pushes: list[Any]) -> None:
                 assert (np.abs(rest) <= generator_box(step.G) + TOLERANCE).all(), step.end
                 for share in np.linspace(0.0, 1.0, 11):
                     x = sol(step.start + share * (step.end - step.start))
-                    chord = (1.0 - share) * flow.set_at(k)[0] + share * step.p
+                    chord = (1.0 - share) * flow.set_at(k).p + share * step.p
                     assert (np.abs(x - chord @ powers) <= flow.swell(step) + TOLERANCE).all(), step.end
                     assert (tubes[0][k] - TOLERANCE <= x).all()
                     assert (x <= tubes[1][k] + TOLERANCE).all()

@@ -99,25 +99,29 @@ class PointRun:
 
     def extend(self, horizon: float, steps: int) -> None:
         """Integrate to the horizon (or ``steps`` steps); note the first instant of a proved violation."""
-        if self._seen == 0 and self._violated(0.0, self.flow.p0, self.flow.G0, 0):
+        if self._seen == 0 and self._violated(0):
             self.violation = 0.0
         while self.flow.time < horizon and len(self.flow.steps) < steps and self.violation is None:
             if not self.flow.advance(horizon):
                 break
             step = self.flow.steps[-1]
             self._seen += 1
-            if not (step.face_upper <= 0.0).all() and self._violated(step.end, step.p, step.G, step.segment):
+            if not (step.face_upper <= 0.0).all() and self._violated(len(self.flow.steps)):
                 self.violation = step.end
 
-    def _violated(self, t: float, p: Floats, G: Floats, segment: int) -> bool:
-        return bool((self._least(t, p, G, segment) > 0.0).any())
+    def _violated(self, k: int) -> bool:
+        return bool((self._least(k) > 0.0).any())
 
-    def _least(self, t: float, p: Floats, G: Floats, segment: int) -> Floats:
-        """Lower bounds of all constraint faces at one instant."""
-        fld = self.flow.fields[segment]
+    def _field(self, k: int) -> Field:
+        """The field of the step that ends at grid instant k."""
+        return self.flow.fields[self.flow.steps[k - 1].segment if k else 0]
+
+    def _least(self, k: int) -> Floats:
+        """Lower bounds of all constraint faces at grid instant k."""
+        fld = self._field(k)
         if not fld.faces:
             return np.zeros(0)
-        inputs, radius = self.flow.variables_at(t, p, G, fld)
+        inputs, radius = self.flow.variables_at(float(self.flow.times[k]), self.flow.set_at(k), fld)
         value, off, _ = self.flow.evaluate(fld.observed, inputs, radius)
         count = len(fld.faces)
         return np.asarray(-self.flow.bounds.upper(-value[:count]) - off[:count])
@@ -126,13 +130,10 @@ class PointRun:
         """The constraint that is violated first, and by how much at that instant; None as long as none is."""
         if self.violation is None:
             return None
-        step = self.flow.steps[-1] if self.violation > 0.0 else None
-        at = (self.violation, self.flow.p0, self.flow.G0, 0)
-        if step is not None:
-            at = (step.end, step.p, step.G, step.segment)
-        least = self._least(*at)
+        at = len(self.flow.steps) if self.violation > 0.0 else 0
+        least = self._least(at)
         k = int(np.argmax(least))
-        return Unproved(self.flow.fields[at[3]].faces[k], self.violation, float(least[k]))
+        return Unproved(self._field(at).faces[k], self.violation, float(least[k]))
 
     def apart_until(self, region: Region) -> float:
         """The trajectory is proved to be outside the target on [0, this instant) (seconds)."""

@@ -59,11 +59,10 @@ def witnessed(
     if reach.usable < 0:
         return None, run.breach()
     region = goal.region
-    sets, generators = reach.sets(region.dim)
-    gauges = region.gauges(run.flow.bounds, sets, generators)
+    sets = reach.sets(region.dim)
+    gauges = region.gauges(sets)
     k = int(np.argmin(gauges))
-    lost = np.zeros(region.dim)
-    nearest = Nearest(float(reach.times[k]), float(gauges[k]), run.flow.bounds, sets[k], generators[k], lost)
+    nearest = Nearest(float(reach.times[k]), float(gauges[k]), sets[k])
     names = compiled.loop.names if isinstance(spec.mode, Target) else spec.mode.state_names
     closest = approach_of(nearest, region, names)
     return closest and replace(closest, start=run.x0, origin="witness"), run.breach()

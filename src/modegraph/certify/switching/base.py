@@ -10,29 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.legal import slack_until
-from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.flow.flow import Flow
+from modegraph.reach.reach_set import ReachSet
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """The set {p(xi) + sum_g G_g(xi) zeta_g + box(lost)} of one part of the starts, when it is nearest to a target.
-
-    Attributes
-    ----------
-    time : seconds
-    gauge : its bound in the target
-    bounds, p, G, lost : of p (n, N), G (g, n, Nq), lost (n,)
-    """
+    """The set of one part of the starts when it is nearest to a target: ``time`` in seconds, ``gauge`` its bound."""
 
     time: float
     gauge: float
-    bounds: PolynomialBounds
-    p: Floats
-    G: Floats
-    lost: Floats
+    set: ReachSet
 
 
 def least_slack(many: Iterable[Mapping[str, float]]) -> dict[str, float]:

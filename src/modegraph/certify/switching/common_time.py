@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.legal import proved_instants, slack_until
-from modegraph.certify.samples import powers_at, sample_variables
+from modegraph.certify.samples import points_of, sample_variables
 from modegraph.certify.switching.base import Evidence, Nearest, least_slack
 from modegraph.certify.targets.region import Region
 from modegraph.expression.tape import Tape
-from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.flow.flow import Flow, generator_box
-from modegraph.reach.start.piece import Piece
-from modegraph.reach.start.restriction import Restriction
+from modegraph.reach.flow.flow import Flow
+from modegraph.reach.reach_set import ReachSet, ReachSets
 
 Floats = NDArray[np.float64]
 
@@ -116,39 +114,33 @@ class Reach:
         self.times = times
         self.usable = min(self.proved, int(np.searchsorted(times, limit, side="right")) - 1)
         self.reset = reset
-        self._targets: dict[int, tuple[Floats, list[Floats]]] = {}
+        self._targets: dict[int, ReachSets] = {}
 
-    def sets(self, dim: int) -> tuple[Floats, list[Floats]]:
-        """p (K, dim, N) and generators at the usable instants, in the space of a target.
+    def sets(self, dim: int) -> ReachSets:
+        """The sets at the usable instants, in the space of a target.
 
         A target on (x, z) of its own memory is met by (x, reset(x)).
         """
         if dim not in self._targets:
-            pairs = [self.flow.state_set(k) for k in range(self.usable + 1)]
-            p = np.stack([pair[0] for pair in pairs]) if pairs else np.zeros((0, dim, 1))
-            G = [pair[1] for pair in pairs]
-            plant = dim - (len(self.reset.outputs) if self.reset is not None else 0)
+            sets = [self.flow.reach_set(k) for k in range(self.usable + 1)]
             if self.reset is not None:
-                p, G = self._with_reset(p[:, :plant], [g[:, :plant] for g in G])
-            self._targets[dim] = p[:, :dim], [g[:, :dim] for g in G]
+                plant = dim - len(self.reset.outputs)
+                sets = [self._with_reset(reach.project(plant), self.reset) for reach in sets]
+            self._targets[dim] = ReachSets.of(self.flow.bounds, [reach.project(dim) for reach in sets], dim)
         return self._targets[dim]
 
-    def _with_reset(self, p: Floats, generators: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
-        assert self.reset is not None
-        joint, sets = [], []
-        k = len(self.reset.outputs)
-        for x, G in zip(p, generators, strict=True):
-            inputs = np.zeros((len(self.reset.variables), x.shape[1]))
-            inputs[: len(x)] = x
-            radius = np.zeros(len(self.reset.variables))
-            radius[: len(x)] = generator_box(G)
-            z, off, _ = self.flow.evaluate(self.reset, inputs, radius)
-            joint.append(np.vstack([x, z]))
-            grown = np.zeros((len(G) + k, len(x) + k, G.shape[2]))
-            grown[: len(G), : len(x)] = G
-            grown[len(G) + np.arange(k), len(x) + np.arange(k), 0] = off
-            sets.append(grown)
-        return np.stack(joint), sets
+    def _with_reset(self, reach: ReachSet, reset: Tape) -> ReachSet:
+        """(x, reset(x)) over a set of plant states x."""
+        n, k, G = reach.dim, len(reset.outputs), reach.G
+        inputs = np.zeros((len(reset.variables), reach.p.shape[1]))
+        inputs[:n] = reach.p
+        radius = np.zeros(len(reset.variables))
+        radius[:n] = reach.spread
+        z, off, _ = self.flow.evaluate(reset, inputs, radius)
+        grown = np.zeros((len(G) + k, n + k, G.shape[2]))
+        grown[: len(G), :n] = G
+        grown[len(G) + np.arange(k), n + np.arange(k), 0] = off
+        return ReachSet(reach.bounds, np.vstack([reach.p, z]), grown, np.concatenate([reach.box, np.zeros(k)]))
 
     def earliest(self, region: Region, plant: int) -> float | None:
         """First instant (seconds) at which a trajectory may be in the target; None: at no time of the flow."""
@@ -172,45 +164,29 @@ def find_crossings(reach: Reach, region: Region) -> list[Crossing] | Missed:
     flow = reach.flow
     if reach.usable < 0:
         return Missed(np.inf, 0.0, False, np.zeros(flow.piece.variables))
-    p, generators = reach.sets(region.dim)
-    radius = np.zeros(p.shape[:2])
-    return _cross(reach, region, flow.piece, flow.bounds, p, generators, radius, 0)
+    return _cross(reach, region, reach.sets(region.dim), 0)
 
 
-def _cross(
-    reach: Reach,
-    region: Region,
-    piece: Piece,
-    bounds: PolynomialBounds,
-    p: Floats,
-    generators: Sequence[Floats],
-    lost: Floats,
-    depth: int,
-) -> list[Crossing] | Missed:
-    gauges = region.swollen_gauges(bounds, p, generators, lost)
+def _cross(reach: Reach, region: Region, sets: ReachSets, depth: int) -> list[Crossing] | Missed:
+    gauges = region.gauges(sets)
     inside = np.flatnonzero(gauges <= 1.0)
     best = int(np.argmin(gauges))
-    nearest = Nearest(float(reach.times[best]), float(gauges[best]), bounds, p[best], generators[best], lost[best])
+    nearest, piece = Nearest(float(reach.times[best]), float(gauges[best]), sets[best]), sets.piece
     if len(inside):
-        return [_crossing(reach, region, bounds, p, gauges, int(inside[0]), nearest)]
+        return [_crossing(reach, region, sets, gauges, int(inside[0]), nearest)]
     missed = Missed(nearest.gauge, nearest.time, False, piece.middle, nearest)
     if depth >= DEEPEST_CELL or piece.variables == 0:
         return missed
-    hopeful, worst = _sampled(reach, region, piece, p, generators)
+    hopeful, worst = _sampled(reach, region, sets)
     if not hopeful:
         return replace(missed, start=worst, sampled=True)
     crossings: list[Crossing] = []
-    variable = widest_variable(bounds, p[best])
-    children = piece.split(variable)
+    children = piece.split(widest_variable(sets[best]))
     if not children:
         # No start is left in this cell: everything is true of it.
         return [Crossing(0, float(reach.times[0]), -np.inf, -np.inf, np.inf, 0.0)]
-    table = reach.flow.table
     for child in children:
-        restriction = Restriction(piece, child, table, p.shape[2])
-        q, error = restriction.apply(p)
-        cells = PolynomialBounds(child, table, p.shape[2])
-        found = _cross(reach, region, child, cells, q, generators, (lost + error) * 1.0000001, depth + 1)
+        found = _cross(reach, region, sets.restricted(child, reach.flow.table), depth + 1)
         if isinstance(found, Missed):
             return replace(found, hopeful=True)
         crossings += found
@@ -218,23 +194,17 @@ def _cross(
 
 
 def _crossing(
-    reach: Reach,
-    region: Region,
-    bounds: PolynomialBounds,
-    p: Floats,
-    gauges: Floats,
-    instant: int,
-    nearest: Nearest,
+    reach: Reach, region: Region, sets: ReachSets, gauges: Floats, instant: int, nearest: Nearest
 ) -> Crossing:
     flow = reach.flow
     window = 0.0
-    end = len(p) - 1
+    end = len(sets) - 1
     # How far reset(x) strays between instants is not bounded.
     if reach.reset is None and instant < end and gauges[min(instant + 1, end)] <= 1.0:
-        size = p.shape[1]
+        size = sets.dim
         steps = flow.steps[instant:end]
         out = np.stack([flow.swell(s)[:size] if len(s.tube) >= size else np.full(size, np.inf) for s in steps])
-        for step, gauge in zip(steps, region.tube_gauges(bounds, p[instant:], out), strict=True):
+        for step, gauge in zip(steps, region.tube_gauges(sets[instant:], out), strict=True):
             if not gauge <= 1.0:
                 break
             window += step.end - step.start
@@ -247,30 +217,27 @@ def _crossing(
     )
 
 
-def _sampled(
-    reach: Reach, region: Region, piece: Piece, p: Floats, generators: Sequence[Floats]
-) -> tuple[bool, Floats]:
+def _sampled(reach: Reach, region: Region, sets: ReachSets) -> tuple[bool, Floats]:
     """Whether every sampled start is inside at some instant (floats: a guess), and the worst of them.
 
     Under a disturbance the remainder counts, for smaller parts do not make it smaller.
     """
+    piece = sets.piece
     eta = sample_variables(piece)
-    powers = powers_at(eta, reach.flow.table.exponents[: p.shape[2]])
-    points = np.einsum("kin,sn->ksi", p, powers)
-    z = np.stack([generator_box(G) for G in generators]) if len(generators) else np.zeros(p.shape[:2])
-    gauges = region.point_gauges(points, z if reach.flow.w_radius.any() else None)
+    gauges = region.point_gauges(points_of(sets, eta), sets.spread if reach.flow.w_radius.any() else None)
     each = gauges.min(axis=0)
     worst = int(np.argmax(each))
     return not piece.known or bool((each < 1.0).all()), piece.middle + piece.radius * eta[worst]
 
 
-def widest_variable(bounds: PolynomialBounds, p: Floats) -> int:
-    """The variable with the largest share in the width of a set p (n, N); nonlinear terms count twice."""
+def widest_variable(reach: ReachSet) -> int:
+    """The variable with the largest share in the width of a set; nonlinear terms count twice."""
+    p, exponents = reach.p, reach.bounds.exponents
     weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)
-    share = np.zeros(bounds.piece.variables)
+    share = np.zeros(reach.piece.variables)
     for v in range(len(share)):
-        uses = bounds.exponents[:, v] > 0
-        nonlinear = bounds.exponents.sum(axis=1) > 1
+        uses = exponents[:, v] > 0
+        nonlinear = exponents.sum(axis=1) > 1
         size = np.abs(p[:, uses]).sum(axis=1) + np.abs(p[:, uses & nonlinear]).sum(axis=1)
         share[v] = float((size * weight).max())
     return int(np.argmax(share))

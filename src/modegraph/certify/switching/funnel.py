@@ -92,9 +92,7 @@ class Sinking:
             energy += seconds * rung.power
             # The next rung is entered with rho <= its own radius, in its own norm.
             radius = rung.lower if k + 1 < len(self.funnel.rungs) and self._same(k) else math.inf
-        bounds, p, G = self.funnel.ball(*at[:2]).set
-        n = region.dim
-        nearest = Nearest(self.start + at[2], best, bounds, p[:n], G[:, :n], np.zeros(n))
+        nearest = Nearest(self.start + at[2], best, self.funnel.ball(*at[:2]).set.project(region.dim))
         if arrived is None:
             return Missed(best, self.start + elapsed, False, np.zeros(0), nearest)
         slack = 1.0 + 1e-9
@@ -182,9 +180,7 @@ class Sunk(Evidence):
 
 def gauge_of(ball: NormBall, region: Region) -> float:
     """Gauge of the states in {rho <= radius} in a target on the first of them."""
-    bounds, p, G = ball.set
-    n = region.dim
-    return float(region.gauges(bounds, p[None, :n], [G[:, :n]])[0])
+    return region.gauge(ball.set.project(region.dim))
 
 
 class Funnels:
@@ -196,16 +192,16 @@ class Funnels:
 
     def enter(self, flow: Flow, regions: Sequence[Region]) -> Sinking | NoFunnel:
         """How the end of a flow sinks: in a known funnel or a new one, leading into the regions if possible."""
-        p, G = flow.state_set(len(flow.steps))
+        last = flow.last_set
         for funnel in self.known:
-            hit = funnel.enter(flow.bounds, p, G)
+            hit = funnel.enter(last)
             if hit is not None and all(gauge_of(funnel.end, region) <= 1.0 for region in regions):
                 return Sinking(funnel, *hit, flow.time)
-        if not (np.isfinite(p).all() and np.isfinite(G).all()):
+        if not last.is_finite:
             return NoFunnel(Mechanism.NOT_BOUNDED)
-        points = sample_powers(flow.piece, flow.bounds.exponents) @ p.T
+        points = sample_powers(flow.piece, flow.bounds.exponents) @ last.p.T
         rng = np.random.default_rng(11)
-        points += np.sign(rng.uniform(-1.0, 1.0, (len(points), len(G)))) @ G[:, :, 0]
+        points += np.sign(rng.uniform(-1.0, 1.0, (len(points), len(last.G)))) @ last.G[:, :, 0]
         middle = points.mean(axis=0)
         fit = np.maximum(np.abs(points - middle).max(axis=0), 1e-12)
         room = ROOM
@@ -214,10 +210,10 @@ class Funnels:
             found = self.builder.build(mouth, fit, lambda s: True)
             if isinstance(found, NoFunnel):
                 return found
-            if found.enter(flow.bounds, p, G) is not None:
+            if found.enter(last) is not None:
                 return self._whole(flow, mouth, fit, regions)
             # Samples seldom reach the corners of what the remainder fills.
-            room *= ROOM * found.gauge(flow.bounds, p, G)
+            room *= ROOM * found.gauge(last)
         return NoFunnel(Mechanism.NOT_IN_ELLIPSOID)
 
     def _whole(self, flow: Flow, mouth: Floats, fit: Floats, regions: Sequence[Region]) -> Sinking | NoFunnel:
@@ -225,7 +221,7 @@ class Funnels:
         found = self.builder.build(mouth, fit, lambda s: all(gauge_of(s, region) <= 1.0 for region in regions))
         if isinstance(found, NoFunnel):
             return found
-        hit = found.enter(flow.bounds, *flow.state_set(len(flow.steps)))
+        hit = found.enter(flow.last_set)
         if hit is None:
             return NoFunnel(Mechanism.NOT_IN_ELLIPSOID)
         self.known.append(found)

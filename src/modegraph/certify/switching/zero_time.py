@@ -46,7 +46,7 @@ class InZeroTime(Evidence):
 
     def __post_init__(self) -> None:
         flow = self.flow
-        legal = flow.failure is None and (flow.faces_at(0.0, flow.p0, flow.G0, 0) <= 0.0).all()
+        legal = flow.failure is None and (flow.faces_at(0.0, flow.set_at(0), 0) <= 0.0).all()
         if not legal or not is_subset(self.start, self.region.set):
             raise ValueError("a start set that is not inside the target, or breaks a constraint")
 
@@ -77,9 +77,8 @@ class InZeroTime(Evidence):
 
     @cached_property
     def nearest(self) -> Nearest | None:
-        n, flow = self.region.dim, self.flow
-        gauge = float(self.region.gauges(flow.bounds, flow.p0[None, :n], [flow.G0[:, :n]])[0])
-        return Nearest(0.0, gauge, flow.bounds, flow.p0, flow.G0, np.zeros(len(flow.p0)))
+        start = self.flow.reach_set(0).project(self.region.dim)
+        return Nearest(0.0, self.region.gauge(start), start)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ A set with faces {x : a'x <= b} is tested face by face; a ball or ellipsoid thro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -15,8 +14,9 @@ from numpy.typing import NDArray
 from modegraph.enclosure.rounding import UNIT
 from modegraph.errors import ModegraphError
 from modegraph.model.sets import Ball, Box, Ellipsoid, Polytope, Set, Zonotope, exact
-from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.quadric import Quadric, generator_sizes
+from modegraph.reach.generators import generator_sizes
+from modegraph.reach.quadric import Quadric
+from modegraph.reach.reach_set import ReachSet, ReachSets
 
 Floats = NDArray[np.float64]
 
@@ -86,41 +86,41 @@ class Region:
 
     # -- containment -----------------------------------------------------------------------------
 
-    def gauges(self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats]) -> Floats:
-        """Upper bound of the gauge of each set {p_k(xi) + sum_g G_kg(xi) zeta_g}, k = 0..K-1.
+    def gauge(self, reach: ReachSet) -> float:
+        """Upper bound of the gauge of one set."""
+        return float(self.gauges(ReachSets.one(reach))[0])
 
-        p (K, n, N) over the variables of ``bounds``; generators: K arrays (g, n, Nq).
-        """
-        size = np.abs(p).sum(axis=-1)
-        if not np.isfinite(size).all():
-            known = np.isfinite(size).all(axis=1)
-            out = np.full(len(p), np.inf)
+    def gauges(self, sets: ReachSets) -> Floats:
+        """Upper bounds (K,) of the gauges of sets in the space of the target; infinite where a set is not bounded."""
+        known = sets.are_finite
+        if not known.all():
+            out = np.full(len(sets), np.inf)
             if known.any():
-                some = [G for G, fine in zip(generators, known, strict=True) if fine]
-                out[known] = self.gauges(bounds, p[known], some)
+                out[known] = self.gauges(sets[np.flatnonzero(known).tolist()])
             return out
-        if self._faces is not None:
-            slack = self._slack(bounds, p, generators)
-            worst = 1.0 - slack / self.distance
-            # Rounding of the division must not turn a miss into a proof.
-            worst = np.where(slack >= 0.0, np.minimum(worst, 1.0), np.maximum(worst, np.nextafter(1.0, 2.0)))
-            return np.asarray(np.where(np.isnan(worst), np.inf, worst).max(axis=1))
-        return self.quadric.gauges(bounds, p, generators)
+        if self._faces is None:
+            return self.quadric.gauges(sets)
+        slack = self._slack(sets)
+        worst = 1.0 - slack / self.distance
+        # Rounding of the division must not turn a miss into a proof.
+        worst = np.where(slack >= 0.0, np.minimum(worst, 1.0), np.maximum(worst, np.nextafter(1.0, 2.0)))
+        gauges = np.asarray(np.where(np.isnan(worst), np.inf, worst).max(axis=1))
+        return np.nextafter(gauges + self.box_gauges(sets.box), np.inf) if sets.box.any() else gauges
 
-    def _slack(self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats]) -> Floats:
-        """Lower bounds (K, f) of the distance of each set from each face, in the unit of the face."""
-        n = self.dim
+    def _slack(self, sets: ReachSets) -> Floats:
+        """Lower bounds (K, f) of the distance of each set, without its box, from each face, in the face's unit."""
+        n, p, generators = self.dim, sets.p, sets.generators
         size = np.abs(p).sum(axis=-1)
         q = np.einsum("fi,kin->kfn", self.A, p)
         spread = generator_sizes(self.A, generators)
-        reach = bounds.upper(q) + spread
+        reach = sets.bounds.upper(q) + spread
         rounding = 4.0 * (n + 4) * UNIT * (size @ np.abs(self.A).T + spread)
         rounding += (size + generator_sizes(np.eye(n), generators)) @ self.dA.T * 1.001
         slack = self.b - (reach + rounding)
         return np.asarray(slack - 2.0 * UNIT * (np.abs(self.b) + np.abs(reach)))
 
-    def binding(self, bounds: PolynomialBounds, p: Floats, G: Floats, lost: Floats) -> tuple[int, float]:
-        """The face that decides the gauge of one set, p (n, N), G (g, n, Nq), with a box of radii lost (n,) added.
+    def binding(self, reach: ReachSet) -> tuple[int, float]:
+        """The face that decides the gauge of one set.
 
         Returns
         -------
@@ -129,8 +129,8 @@ class Region:
             missing of the gauge) where the target has no faces.
         """
         if self._faces is None:
-            return -1, float(self.swollen_gauges(bounds, p[None], [G], lost[None])[0]) - 1.0
-        slack = self._slack(bounds, p[None], [G])[0] - (np.abs(self.A) + self.dA) @ lost
+            return -1, self.gauge(reach) - 1.0
+        slack = self._slack(ReachSets.one(reach))[0] - (np.abs(self.A) + self.dA) @ reach.box
         k = int(np.argmin(slack / self.distance))
         return k, -float(slack[k])
 
@@ -139,23 +139,15 @@ class Region:
         if self._faces is not None:
             reach = radius @ (np.abs(self.A) + self.dA).T * (1.0 + 4.0 * (self.dim + 2) * UNIT)
             return np.asarray((reach / self.distance).max(axis=1) * (1.0 + 4.0 * UNIT))
-        y = radius @ np.abs(self.T).T
-        return np.asarray(np.sqrt((y**2).sum(axis=1)) * self.grow * (1.0 + 8.0 * (self.dim + 4) * UNIT))
+        return self.quadric.box_gauges(radius)
 
-    def swollen_gauges(
-        self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats], radius: Floats
-    ) -> Floats:
-        """As `gauges`, of the sets with boxes of radii (K, n) added to them."""
-        gauges = self.gauges(bounds, p, generators)
-        return np.nextafter(gauges + self.box_gauges(radius), np.inf) if radius.any() else gauges
-
-    def tube_gauges(self, bounds: PolynomialBounds, p: Floats, out: Floats) -> Floats:
+    def tube_gauges(self, sets: ReachSets, out: Floats) -> Floats:
         """Upper bounds (K - 1,) of the gauge on the way from each of K sets to the next.
 
         For each xi the way is within a box of radii out (K - 1, n) of the chord from p_k(xi) to
-        p_k+1(xi), which a convex target contains with its ends.
+        p_k+1(xi), which a convex target contains with its ends; the p_k are known up to the boxes of the sets.
         """
-        plain = self.gauges(bounds, p, [np.zeros((0, p.shape[1], 1))] * len(p))
+        plain = self.gauges(sets.polynomials)
         return np.asarray(np.maximum(plain[:-1], plain[1:]) + self.box_gauges(out))
 
     def point_gauges(self, x: Floats, radius: Floats | None = None) -> Floats:

@@ -7,13 +7,12 @@ common is kept, and no shape of the target is assumed. The gauge is (fn - least)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.certify.samples import powers_at, sample_variables
+from modegraph.certify.samples import points_of, sample_variables
 from modegraph.certify.targets.region import Region
 from modegraph.enclosure.monomials import monomial_count, monomials
 from modegraph.enclosure.rounding import TINY, UNIT
@@ -23,8 +22,9 @@ from modegraph.expression.tape import Tape
 from modegraph.model.sets import Set, Sublevel
 from modegraph.model.sets.level_search import all_outside
 from modegraph.reach.bounds import PolynomialBounds
-from modegraph.reach.flow.framing import generator_box
+from modegraph.reach.generators import generator_box
 from modegraph.reach.pointwise import evaluate_over
+from modegraph.reach.reach_set import ReachSet, ReachSets
 
 Floats = NDArray[np.float64]
 
@@ -57,20 +57,21 @@ class SublevelRegion(Region):
 
     # -- containment -----------------------------------------------------------------------------
 
-    def gauges(self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats]) -> Floats:
-        out = self._sampled(bounds, p)
+    def gauges(self, sets: ReachSets) -> Floats:
+        sets = sets.without_boxes
+        out = self._sampled(sets)
         hopeful = np.flatnonzero(out <= 1.0).tolist()
         if not hopeful:
             return out
         if self._inner is not None:
             # |y| <= 1 in the ellipsoid within is a proof; fn grows with its square.
-            inner = self._inner.gauges(bounds, p[hopeful], [generators[k] for k in hopeful])
+            inner = self._inner.gauges(sets[hopeful])
             out[hopeful] = np.where(inner <= 1.0, np.minimum(inner * inner * (1.0 + 4.0 * UNIT), 1.0), inner)
             return out
-        composed = _Composition(self, bounds)
+        composed = _Composition(self, sets.bounds)
         missed: list[tuple[float, int, Floats, Floats]] = []
         for k in hopeful:
-            tops, polynomials, rest = composed.tops(p[k], generators[k])
+            tops, polynomials, rest = composed.tops(sets[k])
             out[k] = self._gauge(tops)
             if out[k] > 1.0:
                 missed.append((float(out[k]), k, polynomials, rest))
@@ -79,11 +80,10 @@ class SublevelRegion(Region):
                 out[k] = min(out[k], self._gauge(composed.refined(polynomials, rest, self.function.bounds[0])))
         return out
 
-    def _sampled(self, bounds: PolynomialBounds, p: Floats) -> Floats:
+    def _sampled(self, sets: ReachSets) -> Floats:
         """Float gauges (K,) of the worst sampled point, none at or below 1 unless all samples are inside."""
-        eta = np.vstack([np.zeros((1, bounds.piece.variables)), sample_variables(bounds.piece)])
-        points = np.einsum("kin,sn->ksi", p, powers_at(eta, bounds.exponents))
-        known = np.isfinite(points).all(axis=(1, 2))
+        points = points_of(sets, np.vstack([np.zeros((1, sets.piece.variables)), sample_variables(sets.piece)]))
+        known = np.asarray(np.isfinite(points).all(axis=(1, 2)))
         gauges = self.point_gauges(np.where(known[:, None, None], points, 0.0)).max(axis=1)
         return np.where(known & (gauges <= 1.0), 0.0, np.where(known, np.maximum(gauges, ABOVE_ONE), np.inf))
 
@@ -96,22 +96,17 @@ class SublevelRegion(Region):
             return min(gauge, 1.0) if np.isfinite(gauge) else 1.0
         return max(gauge, ABOVE_ONE) if np.isfinite(gauge) else np.inf
 
-    def swollen_gauges(
-        self, bounds: PolynomialBounds, p: Floats, generators: Sequence[Floats], radius: Floats
-    ) -> Floats:
-        if not radius.any():
-            return self.gauges(bounds, p, generators)
-        return self.gauges(bounds, p, [_with_box(G, r) for G, r in zip(generators, radius, strict=True)])
+    def binding(self, reach: ReachSet) -> tuple[int, float]:
+        return -1, (self.gauge(reach) - 1.0) * float(self.distance[0])
 
-    def binding(self, bounds: PolynomialBounds, p: Floats, G: Floats, lost: Floats) -> tuple[int, float]:
-        gauge = float(self.swollen_gauges(bounds, p[None], [G], lost[None])[0])
-        return -1, (gauge - 1.0) * float(self.distance[0])
-
-    def tube_gauges(self, bounds: PolynomialBounds, p: Floats, out: Floats) -> Floats:
+    def tube_gauges(self, sets: ReachSets, out: Floats) -> Floats:
         # No convexity: the chord itself is a generator around its middle.
+        p = sets.p
         middle, half = 0.5 * (p[:-1] + p[1:]), 0.5 * (p[1:] - p[:-1])
         lost = 4.0 * UNIT * (np.abs(p[:-1]) + np.abs(p[1:])).sum(axis=2)
-        return self.gauges(bounds, middle, [_with_box(h[None], r) for h, r in zip(half, out + lost, strict=True)])
+        if sets.box.any():
+            lost = lost + np.maximum(sets.box[:-1], sets.box[1:]) * (1.0 + 8.0 * UNIT)
+        return self.gauges(ReachSets(sets.bounds, middle, [h[None] for h in half], out + lost))
 
     def point_gauges(self, x: Floats, radius: Floats | None = None) -> Floats:
         flat = x.reshape(-1, self.dim)
@@ -151,10 +146,11 @@ class _Composition:
         self.table = table
         self.limit = function.bounds[0]
 
-    def tops(self, p: Floats, G: Floats) -> tuple[Floats, Floats, Floats]:
-        """Upper bounds (parts,) over {p(xi) + sum_g G_g(xi) zeta_g}, from polynomials and radii, returned too."""
+    def tops(self, reach: ReachSet) -> tuple[Floats, Floats, Floats]:
+        """Upper bounds (parts,) over a set without a box, from polynomials and radii, returned too."""
+        G = reach.G
         inputs = np.zeros((self.dim, self.size))
-        inputs[:, : p.shape[1]] = p
+        inputs[:, : reach.p.shape[1]] = reach.p
         box = generator_box(G) if len(G) else np.zeros(self.dim)
         polynomials, rest, undefined = self._over(self.value, inputs, box)
         polynomials, rest = polynomials[: self.parts], rest[: self.parts]
@@ -203,12 +199,3 @@ class _Composition:
                 if top <= room:
                     tops[i] = min(tops[i], limits[i])
         return tops
-
-
-def _with_box(G: Floats, radius: Floats) -> Floats:
-    """Generators G (g, n, N) and a box of radii (n,)."""
-    n = len(radius)
-    out = np.zeros((len(G) + n, n, G.shape[2]))
-    out[: len(G)] = G
-    out[len(G) + np.arange(n), np.arange(n), 0] = radius
-    return out

@@ -24,7 +24,7 @@ def nonlinear_variable(flow: Flow, cut: Sequence[int] = ()) -> int:
 
     ``cut``: variables that are cut already, in halves each time: squares of those are a quarter.
     """
-    p, _ = flow.set_at(max(1, len(flow.steps) // 3) if flow.steps else 0)
+    p = flow.set_at(max(1, len(flow.steps) // 3) if flow.steps else 0).p
     exponents = flow.bounds.exponents
     p = p * (0.5 ** exponents[:, list(cut)].sum(axis=1))
     weight = 1.0 / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)

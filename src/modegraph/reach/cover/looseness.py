@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.reach.cover.chain import Chain
-from modegraph.reach.flow.flow import generator_box
 from modegraph.reach.start.class_chart import parameters_of
 
 Floats = NDArray[np.float64]
@@ -29,11 +28,11 @@ def remainder(chain: Chain) -> tuple[Floats, Floats]:
     Of a class of references, the polynomial part is that of the middle one.
     """
     flow = chain.flows[-1]
-    p, G = flow.state_set(len(flow.steps))
+    last = flow.last_set
     exponents = flow.bounds.exponents
     fixed = [variable for variable, _ in parameters_of(flow.piece)]
     own = (exponents[:, fixed] == 0).all(axis=1) & exponents.any(axis=1)
-    return generator_box(G), np.abs(p[:, own]).sum(axis=1)
+    return last.spread, np.abs(last.p[:, own]).sum(axis=1)
 
 
 def looseness(chain: Chain) -> float:
@@ -49,7 +48,7 @@ def is_loose(chain: Chain, share: float | None = None) -> bool:
     if share is None:
         share = LOOSE_CLASS if chain.piece.chart.parameters else LOOSE
     z, own = remainder(chain)
-    size = float(np.abs(chain.flows[-1].set_at(0)[0]).sum(axis=1).max())
+    size = float(np.abs(chain.flows[-1].set_at(0).p).sum(axis=1).max())
     return bool((z > share * own + 1e-6 * size).any())
 
 

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import UNIT
-from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.field import Field
 from modegraph.reach.flow.flow import Flow, Order
-from modegraph.reach.flow.framing import generator_box
+from modegraph.reach.generators import with_box
 from modegraph.reach.parallelotope import half_widths, principal_axes, tightest
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]
@@ -63,8 +63,8 @@ def filled_share(flow: Flow) -> float:
 
     Above 1 the polynomial part is not worth variables of its own.
     """
-    p, G = flow.state_set(len(flow.steps))
-    return float((generator_box(G) / np.maximum(np.abs(p[:, 1:]).sum(axis=1), 1e-300)).min())
+    last = flow.last_set
+    return float((last.spread / np.maximum(np.abs(last.p[:, 1:]).sum(axis=1), 1e-300)).min())
 
 
 def halved(flow: Flow, variable: int) -> list[Flow]:
@@ -93,19 +93,20 @@ def _like(
     )
 
 
-def _candidates(fields: Sequence[Field], bounds: PolynomialBounds, p: Floats, G: Floats) -> list[Floats]:
+def _candidates(fields: Sequence[Field], reach: ReachSet) -> list[Floats]:
     frame = fields[0].frame
-    return [np.eye(len(p)), principal_axes(bounds, p, G), *([] if frame is None else [frame.V])]
+    return [np.eye(reach.dim), principal_axes(reach), *([] if frame is None else [frame.V])]
 
 
 def _around_one(flow: Flow, fields: Sequence[Field]) -> Piece | None:
     """The linear part of p as it is in the unknowns and its n largest columns, a parallelotope around the rest."""
-    p, G = flow.state_set(len(flow.steps))
+    last = flow.last_set
+    p, G = last.p, with_box(last.G, last.box) if last.box.any() else last.G
     n, free = len(p), flow.piece.chart.free
     if free == 0 and not len(flow.piece.uncertain):
         return None
     linear = flow.bounds.linear_part(p)
-    size = np.abs(linear).sum(axis=1) + generator_box(G)
+    size = np.abs(linear).sum(axis=1) + last.spread
     length = np.linalg.norm(linear[:, :free] / np.maximum(size, 1e-300)[:, None], axis=0)
     kept, small = np.split(np.argsort(-length, kind="stable"), [n])
     below, above = flow.bounds.nonlinear_radius(p)
@@ -115,14 +116,14 @@ def _around_one(flow: Flow, fields: Sequence[Field]) -> Piece | None:
     added = np.zeros((n + len(small), n, G.shape[2]))
     added[np.arange(n), np.arange(n), 0] = rest
     added[n:, :, 0] = linear[:, small].T
-    every = np.concatenate([G, added])
-    nothing, origin = np.zeros_like(p), np.zeros(n)
-    found = tightest([(flow.bounds, nothing, every)], _candidates(fields, flow.bounds, nothing, every), origin)
+    around = ReachSet.of(flow.bounds, np.zeros_like(p), np.concatenate([G, added]))
+    origin = np.zeros(n)
+    found = tightest([around], _candidates(fields, around), origin)
     if found is None:
         return None
     M = found[0] * (found[1] * (1.0 + 1e-9))
     # The products are rounded entry by entry: what counts is that this very M holds the rest.
-    if not (half_widths(flow.bounds, nothing, every, M, origin) <= 1.0).all():
+    if not (half_widths(around, M, origin) <= 1.0).all():
         return None
     chart = flow.piece.chart.around(centre, np.hstack([linear[:, np.sort(kept)], M]), original=False)
     # The same variables: the unknowns on the scale of their ranges in this piece.
@@ -132,14 +133,14 @@ def _around_one(flow: Flow, fields: Sequence[Field]) -> Piece | None:
 
 def _around_all(flows: Sequence[Flow], fields: Sequence[Field]) -> Piece | None:
     """One parallelotope around the ends of all flows."""
-    sets = [(flow.bounds, *flow.state_set(len(flow.steps))) for flow in flows]
-    hulls = [flow.end_box() for flow in flows]
+    sets = [flow.last_set for flow in flows]
+    hulls = [reach.ranges() for reach in sets]
     centre = 0.5 * (np.min([lo for lo, _ in hulls], axis=0) + np.max([hi for _, hi in hulls], axis=0))
-    found = tightest(sets, _candidates(fields, *sets[0]), centre)
+    found = tightest(sets, _candidates(fields, sets[0]), centre)
     if found is None:
         return None
     M = found[0] * (found[1] * (1.0 + 1e-9))
-    if not all((half_widths(bounds, p, G, M, centre) <= 1.0).all() for bounds, p, G in sets):
+    if not all((half_widths(reach, M, centre) <= 1.0).all() for reach in sets):
         return None
     chart = flows[0].piece.chart.around(centre, M, original=False)
     # Each piece scales its unknowns to a range of its own: what all hold is known in their units only.

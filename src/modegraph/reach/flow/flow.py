@@ -19,12 +19,14 @@ from modegraph.reach.failure import Failure, Mechanism, engine_stopped
 from modegraph.reach.field import Field
 from modegraph.reach.flow.breakdown import breakdown
 from modegraph.reach.flow.error_table import error_table
-from modegraph.reach.flow.framing import generator_box, into_frame, out_of_frame, thinned
+from modegraph.reach.flow.framing import into_frame, out_of_frame
 from modegraph.reach.flow.grid import next_instant
 from modegraph.reach.flow.passage import Passages
 from modegraph.reach.flow.records import Order, Step
 from modegraph.reach.flow.step_control import MOST_TIME_DEGREE, error_guess, feeding_cap, time_degree
+from modegraph.reach.generators import generator_box, thinned
 from modegraph.reach.pointwise import evaluate_over, workspace
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.class_chart import start_polynomials
 from modegraph.reach.start.piece import Piece
 
@@ -181,24 +183,24 @@ class Flow:
         """Outputs of a tape at one instant: polynomials (no, N), radii (no,), first undefined row or -1."""
         return evaluate_over(tape, self.table, self.order.degree, inputs, radius)
 
-    def variables_at(self, t: float, p: Floats, G: Floats, fld: Field) -> tuple[Floats, Floats]:
-        """Polynomials (nv, N) and radii (nv,) of all tape variables at one instant."""
+    def variables_at(self, t: float, reach: ReachSet, fld: Field) -> tuple[Floats, Floats]:
+        """Polynomials (nv, N) and radii (nv,) of all tape variables at one instant; the set as `set_at` gives it."""
         inputs = np.zeros((fld.variables, self.table.size))
-        inputs[: fld.states] = p
+        inputs[: fld.states] = reach.p
         inputs[fld.time_index, 0] = t
         inputs[fld.first_w : fld.first_d, 0] = self.w_centre
         inputs[fld.first_d :] = self._unknowns
         radius = np.zeros(fld.variables)
-        radius[: fld.states] = generator_box(G)
+        radius[: fld.states] = reach.spread
         radius[fld.first_w : fld.first_d] = self.w_radius
         return inputs, radius
 
-    def faces_at(self, t: float, p: Floats, G: Floats, segment: int) -> Floats:
-        """Proved upper bound of every constraint face at one instant, with the inputs of ``segment``."""
+    def faces_at(self, t: float, reach: ReachSet, segment: int) -> Floats:
+        """Proved upper bound of every constraint face on a set at one instant, with the inputs of ``segment``."""
         fld = self.fields[segment]
         if not fld.faces:
             return np.zeros(0)
-        inputs, radius = self.variables_at(t, p, G, fld)
+        inputs, radius = self.variables_at(t, reach, fld)
         value, off, _ = self.evaluate(fld.observed, inputs, radius)
         faces = value[: len(fld.faces)]
         upper = self.bounds.upper(faces)
@@ -275,7 +277,7 @@ class Flow:
                 seen = self._observe(fld, h, tube)
                 look = shortened < SHORTER_LOOKS and h > 1e-6 and not (seen[0] <= 0.0).all()
                 # Between the ends a constraint is bounded through its bend: try a shorter look.
-                if look and (self.faces_at(t1, p, G, self.segment) <= 0.0).all():
+                if look and (self.faces_at(t1, self._own(p, G), self.segment) <= 0.0).all():
                     shortened += 1
                     h_try = 0.25 * h
                     continue
@@ -454,23 +456,22 @@ class Flow:
         """Grid instants, start included."""
         return np.array([self.steps[0].start if self.steps else self.time, *(s.end for s in self.steps)])
 
-    def set_at(self, k: int) -> tuple[Floats, Floats]:
-        """(p, G) at grid instant k."""
-        if k == 0:
-            return self.p0, self.G0
-        return self.steps[k - 1].p, self.steps[k - 1].G
+    def set_at(self, k: int) -> ReachSet:
+        """The set at grid instant k, in the coordinates of the fields."""
+        return self._own(self.p0, self.G0) if k == 0 else self._own(self.steps[k - 1].p, self.steps[k - 1].G)
 
-    def state_set(self, k: int) -> tuple[Floats, Floats]:
-        """(p, G) at grid instant k in the coordinates of the states."""
-        p, G = self.set_at(k)
-        return (p, G) if self.frame is None else out_of_frame(self.frame, p, G)
+    def _own(self, p: Floats, G: Floats) -> ReachSet:
+        return ReachSet.of(self.bounds, p, G)
 
-    def end_box(self) -> tuple[Floats, Floats]:
-        """Box (lo, hi), each (n,), of the last set."""
-        p, G = self.state_set(len(self.steps))
-        z = generator_box(G)
-        lo, hi = self.bounds.ranges(p)
-        return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
+    def reach_set(self, k: int) -> ReachSet:
+        """The set at grid instant k, in the coordinates of the states."""
+        own = self.set_at(k)
+        return own if self.frame is None else self._own(*out_of_frame(self.frame, own.p, own.G))
+
+    @property
+    def last_set(self) -> ReachSet:
+        """The set at the end, in the coordinates of the states."""
+        return self.reach_set(len(self.steps))
 
     def swell(self, step: Step) -> Floats:
         """Box (n,) by which the tube of a step exceeds the hull of p at its ends, state coordinates."""
@@ -483,7 +484,7 @@ class Flow:
 
     def tubes(self) -> tuple[Floats, Floats]:
         """Boxes (steps, n) of everything passed during each closed step."""
-        polynomials = np.stack([self.state_set(k)[0] for k in range(len(self.steps) + 1)])
+        polynomials = np.stack([self.reach_set(k).p for k in range(len(self.steps) + 1)])
         lo, hi = self.bounds.ranges(polynomials)
         out = np.stack([self.swell(s) for s in self.steps])
         if self.frame is not None:

@@ -21,11 +21,11 @@ from modegraph.enclosure.monomials import monomials
 from modegraph.enclosure.rounding import UNIT
 from modegraph.expression.ops import RELU
 from modegraph.reach.field import Field
-from modegraph.reach.flow.framing import generator_box
 from modegraph.reach.flow.grid import is_exact
 from modegraph.reach.flow.kinks import Kinks, Passage
 from modegraph.reach.flow.own_time import in_own_time
 from modegraph.reach.flow.records import Step
+from modegraph.reach.generators import generator_box
 
 if TYPE_CHECKING:
     from modegraph.reach.flow.flow import Flow

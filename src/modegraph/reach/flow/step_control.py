@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modegraph.reach.flow.framing import generator_box
+from modegraph.reach.generators import generator_box
 from modegraph.reach.start.piece import Piece
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,9 @@ from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.field import Field
 from modegraph.reach.float_loop import FloatLoop
 from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.generators import with_box
 from modegraph.reach.parallelotope import half_widths, modal_axes
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.class_chart import parameters_of, scale_of
 from modegraph.reach.start.piece import Chart, Piece
 
@@ -108,7 +110,7 @@ class TailSearch:
         start = max(flow.time for flow in flows)
         if not keep:
             return self._nothing_moves(flows, start)
-        ends = [flow.set_at(len(flow.steps))[0][:, 0] for flow in flows]
+        ends = [flow.set_at(len(flow.steps)).p[:, 0] for flow in flows]
         centre = self._floats.equilibrium(np.mean(ends, axis=0), keep)
         if centre is None:
             return TailFailure(Mechanism.NO_EQUILIBRIUM)
@@ -152,12 +154,12 @@ class TailSearch:
                 tilt[:, k] = 0.5 * (ends[1] - ends[0])
         return tilt
 
-    def _from_centre(self, flow: Flow) -> tuple[Floats, Floats]:
-        """The end of a flow without what the centre of B moves by: (p, G) as in `half_widths`."""
-        p, G = flow.set_at(len(flow.steps))
+    def _from_centre(self, flow: Flow) -> ReachSet:
+        """The end of a flow, in the coordinates of the fields, without what the centre of B moves by."""
+        end = flow.set_at(len(flow.steps))
         if not self._tilt.any():
-            return p, G
-        p, n = p.copy(), self.fld.states
+            return end
+        p, n = end.p.copy(), self.fld.states
         lost = np.zeros(n)
         own = dict(parameters_of(flow.piece))
         for v, number in parameters_of(self._whole):
@@ -166,15 +168,13 @@ class TailSearch:
             mine = next((u for u, k in own.items() if k == number), None)
             if mine is None:
                 # Cut to a point, or nearly: what is left of its range is not known here.
-                return np.full_like(p, np.nan), G
+                return replace(end, p=np.full_like(p, np.nan))
             c, r = scale_of(flow.piece, mine)
             p[:, 0] -= tilt * ((c - middle) / radius)
             p[:, flow.bounds.linear[mine]] -= tilt * (r / radius)
             lost += np.abs(tilt) * (abs(c) + abs(middle) + r) / radius
         lost = 16.0 * UNIT * (lost * (len(own) + 1) + np.abs(p).sum(axis=1)) + TINY
-        box = np.zeros((n, n, G.shape[2]))
-        box[np.arange(n), np.arange(n), 0] = lost
-        return p, np.concatenate([G, box])
+        return replace(end, p=p, G=with_box(end.G, lost))
 
     def _disturbed_size(self, inverse: Floats, slope: Floats, centre: Floats) -> Floats:
         """Float estimate of the ultimate bound under the disturbance, in the frame's coordinates."""
@@ -185,7 +185,7 @@ class TailSearch:
     def _nothing_moves(self, flows: Sequence[Flow], start: float) -> Tail:
         """No state matters to a constraint: they hold for ever as they hold at one instant."""
         last = len(flows[0].fields) - 1
-        upper = np.max([f.faces_at(f.time, *f.set_at(len(f.steps)), last) for f in flows], axis=0)
+        upper = np.max([f.faces_at(f.time, f.set_at(len(f.steps)), last) for f in flows], axis=0)
         unbounded = np.full(self.fld.states, np.inf)
         return Tail(start, upper, np.full(self.fld.outputs, np.inf), -unbounded, unbounded, np.inf)
 
@@ -225,8 +225,7 @@ class TailSearch:
 
     def _half_widths(self, flow: Flow, axes: Floats, centre: Floats) -> Floats:
         keep = self.states
-        p, G = self._from_centre(flow)
-        return half_widths(flow.bounds, p[keep], G[:, keep], axes, centre[keep])
+        return half_widths(self._from_centre(flow).select(keep), axes, centre[keep])
 
     def _inside(self, flow: Flow, axes: Floats, centre: Floats) -> bool:
         return bool((self._half_widths(flow, axes[self.states], centre) < 1.0).all())

@@ -23,6 +23,7 @@ from modegraph.reach.bounds import PolynomialBounds
 from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.float_loop import FloatLoop
 from modegraph.reach.pointwise import evaluate_over
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.piece import Chart, Piece
 from modegraph.reach.tail.decay import DecayRegion, Norm, SettledLoop
 from modegraph.reach.tail.lyapunov import shrinking_ellipsoid
@@ -68,34 +69,31 @@ class NormBall:
         return Piece(chart, -np.ones(m), np.ones(m))
 
     @cached_property
-    def set(self) -> tuple[PolynomialBounds, Floats, Floats]:
-        """Bounds, p (n, N) and generators (n, n, 1): what rounding the axes loses."""
+    def set(self) -> ReachSet:
+        """With generators (n, n, 1): what rounding the axes loses."""
         n = len(self.norm.centre)
         table = monomials((1,) * self.piece.variables, 2)
         p, _, _ = self.piece.polynomials(table.linear, table.size)
         G = np.zeros((n, n, 1))
         G[np.arange(n), np.arange(n), 0] = 4.0 * UNIT * np.abs(p).sum(axis=1) + TINY
-        return PolynomialBounds(self.piece, table, table.size), p, G
+        return ReachSet.of(PolynomialBounds(self.piece, table, table.size), p, G)
 
     def box(self) -> tuple[Floats, Floats]:
-        bounds, p, G = self.set
-        lo, hi = bounds.ranges(p)
-        z = np.abs(G).sum(axis=(0, 2))
-        return np.nextafter(lo - z, -np.inf), np.nextafter(hi + z, np.inf)
+        return self.set.ranges()
 
     def observed(self) -> tuple[Floats, float, Floats]:
         """Upper bounds of the constraint faces, of u'u, and of the tracking errors' sizes."""
         fld = self.loop.fld
         table = monomials((1,) * self.piece.variables, 2)
-        bounds, p, G = self.set
+        bounds, reach = self.set.bounds, self.set
         _, unknowns, _ = self.piece.polynomials(table.linear, table.size)
         inputs = np.zeros((fld.variables, table.size))
-        inputs[: fld.states] = p
+        inputs[: fld.states] = reach.p
         inputs[fld.time_index, 0] = fld.start
         inputs[fld.first_w : fld.first_d, 0] = self.loop.w_centre
         inputs[fld.first_d :] = unknowns
         radius = np.zeros(fld.variables)
-        radius[: fld.states] = np.abs(G).sum(axis=(0, 2))
+        radius[: fld.states] = reach.spread
         radius[fld.first_w : fld.first_d] = self.loop.w_radius
         value, off, _ = evaluate_over(fld.observed, table, table.order, inputs, radius)
         upper = bounds.upper(value) + off
@@ -160,24 +158,24 @@ class Funnel:
     loop: SettledLoop
     rungs: tuple[Rung, ...]
 
-    def enter(self, bounds: PolynomialBounds, p: Floats, G: Floats) -> tuple[int, float] | None:
+    def enter(self, reach: ReachSet) -> tuple[int, float] | None:
         """The deepest rung that holds a set, and the radius there; None if no rung does."""
         gauge, norm = math.inf, None
         found = None
-        if not np.isfinite(p).all() or not np.isfinite(G).all():
+        if not reach.is_finite:
             return None
         for k, rung in enumerate(self.rungs):
             if rung.norm is not norm:
                 norm = rung.norm
-                gauge = float(norm.quadric.gauges(bounds, p[None], [G])[0])
+                gauge = norm.quadric.gauge(reach)
             if gauge <= rung.radius:
                 found = k, gauge
         return found
 
-    def gauge(self, bounds: PolynomialBounds, p: Floats, G: Floats) -> float:
+    def gauge(self, reach: ReachSet) -> float:
         """How much larger than the mouth a set is."""
         first = self.rungs[0]
-        return float(first.norm.quadric.gauges(bounds, p[None], [G])[0]) / first.radius
+        return first.norm.quadric.gauge(reach) / first.radius
 
     @property
     def end(self) -> NormBall:
@@ -295,8 +293,7 @@ class FunnelBuilder:
                 continue
             mouth = 1.0
             if last is not None:
-                bounds, p, G = last.set
-                mouth = float(norm.quadric.gauges(bounds, p[None], [G])[0])
+                mouth = norm.quadric.gauge(last.set)
             rungs = self._descend(norm, mouth, push, box, enough)
             if rungs:
                 return rungs

@@ -10,9 +10,10 @@ import modegraph as mg
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.class_chart import parameters_of, scale_of
 from modegraph.reach.start.piece import Piece
-from modegraph.reach.substitution import Substitution, holds
+from modegraph.reach.start.substitution import Substitution, holds
 from tests.soundness.families import oscillator
 
 P = np.array([0.61, 0.17])
@@ -28,7 +29,8 @@ def flow_of(piece: Piece | None = None) -> Flow:
 def test_the_polynomial_with_the_parameters_fixed() -> None:
     flow = flow_of()
     p = flow.steps[-1].p
-    fixed, out = Substitution(flow, P)(p, np.zeros(2))
+    one = Substitution(flow.bounds, P)(ReachSet.of(flow.bounds, p))
+    fixed, out = one.p, one.box
     exponents = flow.bounds.exponents
     variables = [v for v, _ in parameters_of(flow.piece)]
     assert not fixed[:, (exponents[:, variables] > 0).any(axis=1)].any()
@@ -46,7 +48,8 @@ def test_rounding_is_in_the_box() -> None:
     """Against exact arithmetic, coefficient by coefficient."""
     flow = flow_of()
     p = flow.steps[-1].p
-    fixed, out = Substitution(flow, P)(p, np.zeros(2))
+    one = Substitution(flow.bounds, P)(ReachSet.of(flow.bounds, p))
+    fixed, out = one.p, one.box
     exponents = flow.bounds.exponents
     factor = [Fraction(1)] * len(exponents)
     rest = exponents.copy()
@@ -69,7 +72,7 @@ def test_the_end_of_the_class_is_in_it() -> None:
     region = oscillator().region
     for p in (region.lo, region.hi, np.array([region.lo[0], region.hi[1]])):
         assert holds(flow.piece, p)
-        assert Substitution(flow, p)(flow.p0, np.zeros(2))[0].any()
+        assert Substitution(flow.bounds, p)(flow.set_at(0)).p.any()
     assert not holds(flow.piece, np.nextafter(region.hi, 2.0) + 1e-15)
 
 

@@ -1,14 +1,16 @@
-"""The polynomials of a class flowpipe with the parameters fixed: what one of its references can reach."""
+"""The reach sets of a class with the parameters fixed: what one of its references can reach."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import TINY, UNIT
-from modegraph.reach.flow.flow import Flow
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.class_chart import parameters_of, scale_of
 from modegraph.reach.start.piece import Piece
 
@@ -27,19 +29,19 @@ def _scaled(piece: Piece, variable: int, value: float) -> Fraction:
 
 
 class Substitution:
-    """Parameters p (k,) put into polynomials over its piece.
+    """Parameters p (k,) put into polynomials over a piece, which must hold p.
 
-    A parameter is c + r eta, eta the variable of the flow; eta = (p - c) / r is rounded to nearest. The
-    variable disappears: what is left is a polynomial over the same table. The piece of the flow must hold p.
+    A parameter is c + r eta, eta the variable of the piece; eta = (p - c) / r is rounded to nearest. The
+    variable disappears: what is left is a polynomial over the same table.
     """
 
-    def __init__(self, flow: Flow, p: Floats) -> None:
-        exponents = flow.bounds.exponents
+    def __init__(self, bounds: PolynomialBounds, p: Floats) -> None:
+        exponents = bounds.exponents
         size = len(exponents)
         factor = np.ones(size)
         rest = exponents.copy()
-        for variable, k in parameters_of(flow.piece):
-            eta = _scaled(flow.piece, variable, p[k])
+        for variable, k in parameters_of(bounds.piece):
+            eta = _scaled(bounds.piece, variable, p[k])
             assert abs(eta) <= 1
             factor = factor * float(eta) ** exponents[:, variable]
             rest[:, variable] = 0
@@ -51,7 +53,7 @@ class Substitution:
         top = int(exponents.sum(axis=1).max(initial=0))
         self._error = 2.0 * (size + 6 * top + 2 * len(p) + 8) * UNIT
 
-    def __call__(self, p: Floats, out: Floats) -> tuple[Floats, Floats]:
-        """Polynomials (n, N) and box (n,) with the parameters fixed; the box also holds what rounding loses."""
-        lost = self._error * np.abs(p).sum(axis=1) + TINY
-        return p @ self._matrix, np.asarray((out + lost) * (1.0 + 4.0 * UNIT))
+    def __call__(self, reach: ReachSet) -> ReachSet:
+        """A set with the parameters fixed; its box also holds what rounding loses."""
+        lost = self._error * np.abs(reach.p).sum(axis=1) + TINY
+        return replace(reach, p=reach.p @ self._matrix, box=(reach.box + lost) * (1.0 + 4.0 * UNIT))

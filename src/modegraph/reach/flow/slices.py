@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.ranges import linear_bound
 from modegraph.enclosure.rounding import UNIT
-from modegraph.reach.flow.flow import Flow, generator_box
+from modegraph.reach.bounds import PolynomialBounds
+from modegraph.reach.flow.flow import Flow
+from modegraph.reach.reach_set import ReachSet
 
 Floats = NDArray[np.float64]
 
@@ -23,17 +24,8 @@ STRAIGHT = 1e-3
 """A polynomial whose nonlinear part has less than this share in its width is not bisected."""
 
 
-@dataclass(frozen=True)
-class Slice:
-    """p(xi) + [-out, out]: polynomials (n, N) over the piece of a flow, and a box (n,)."""
-
-    slicer: Slicer
-    p: Floats
-    out: Floats
-
-
 class Slicer:
-    """Slices of one flow in the coordinates of the states.
+    """Slices of one flow, {p(xi) + e : |e| <= box}, in the coordinates of the states.
 
     Inside a step p(s) lies within ``bend`` of the chord of its ends, for the same xi, and the rest
     within ``tube``. On a part of a step the chord is within the hull of its own two ends.
@@ -42,26 +34,25 @@ class Slicer:
     def __init__(self, flow: Flow) -> None:
         self.flow = flow
         self.times = np.array([flow.steps[0].start, *(s.end for s in flow.steps)]) if flow.steps else np.zeros(1)
-        sets = [flow.state_set(k) for k in range(len(flow.steps) + 1)]
-        self.p = np.stack([p for p, _ in sets])
-        self.z = np.stack([generator_box(G) for _, G in sets])
+        sets = [flow.reach_set(k) for k in range(len(flow.steps) + 1)]
+        self.p = np.stack([reach.p for reach in sets])
+        self.z = np.stack([reach.spread for reach in sets])
         n = self.p.shape[1]
         lost = np.zeros((len(sets), n))
         if flow.frame is not None:
             # The last n generators are what rounding lost on the way out of the frame.
-            lost = np.stack([np.abs(G[-n:]).sum(axis=(0, 2)) for _, G in sets])
+            lost = np.stack([np.abs(reach.G[-n:]).sum(axis=(0, 2)) for reach in sets])
         swell = np.array([flow.swell(step) for step in flow.steps]).reshape(-1, n)
         size = np.abs(self.p).sum(axis=2)
         # 16: the weight of a chord has two roundings, a combination of coefficients four more.
         rounding = 16.0 * UNIT * (size[:-1] + size[1:])
         self.swell = (swell + np.maximum(lost[:-1], lost[1:]) + rounding) * (1.0 + 8.0 * UNIT)
-        bounds = flow.bounds
-        m = flow.piece.variables
-        work = len(bounds.exponents) * max(1, m * m)
-        self.cells = int(np.clip(CELL_WORK / work, LEAST_CELLS, MOST_CELLS))
 
-    def instant(self, k: int) -> Slice:
-        return Slice(self, self.p[k], self.z[k])
+    def _slice(self, p: Floats, box: Floats) -> ReachSet:
+        return ReachSet.of(self.flow.bounds, p).plus_box(box)
+
+    def instant(self, k: int) -> ReachSet:
+        return self._slice(self.p[k], self.z[k])
 
     def _chord(self, step: int, t: float) -> Floats:
         a, b = self.times[step], self.times[step + 1]
@@ -69,29 +60,26 @@ class Slicer:
             return np.asarray(self.p[step if t == a else step + 1])
         return np.asarray(self.p[step] + (t - a) / (b - a) * (self.p[step + 1] - self.p[step]))
 
-    def at(self, t: float) -> Slice:
+    def at(self, t: float) -> ReachSet:
         """The slice at an instant the flow covers."""
         k = int(np.searchsorted(self.times, t))
         if self.times[k] == t:
             return self.instant(k)
-        return Slice(self, self._chord(k - 1, t), self.swell[k - 1])
+        return self._slice(self._chord(k - 1, t), self.swell[k - 1])
 
     def support(self, k: int, dims: tuple[int, int], directions: Floats) -> Floats:
-        """Upper bounds (h,) of u . (two states) at instant k over unit vectors u (h, 2)."""
-        p, G = self.flow.state_set(k)
-        upper = self.flow.bounds.upper(directions @ p[list(dims)])
-        spread = np.abs(np.einsum("hi,gim->hgm", directions, G[:, list(dims)])).sum(axis=(1, 2))
-        return np.asarray(upper + spread * (1.0 + 1e-12) + 1e-12 * np.abs(p[list(dims)]).sum())
+        """Upper bounds (h,) of u . (two states) at instant k over vectors u (h, 2)."""
+        return self.flow.reach_set(k).select(dims).support(directions)
 
-    def over(self, t0: float, t1: float) -> list[Slice]:
+    def over(self, t0: float, t1: float) -> list[ReachSet]:
         """Slices whose common hull holds everything passed in [t0, t1], t0 < t1, within the flow."""
         first = int(np.searchsorted(self.times, t0, side="right")) - 1
         last = int(np.searchsorted(self.times, t1)) - 1
-        slices = [Slice(self, self._chord(first, t0), self.swell[first])]
+        slices = [self._slice(self._chord(first, t0), self.swell[first])]
         slices += [
-            Slice(self, self.p[k], np.maximum(self.swell[k - 1], self.swell[k])) for k in range(first + 1, last + 1)
+            self._slice(self.p[k], np.maximum(self.swell[k - 1], self.swell[k])) for k in range(first + 1, last + 1)
         ]
-        return [*slices, Slice(self, self._chord(last, t1), self.swell[last])]
+        return [*slices, self._slice(self._chord(last, t1), self.swell[last])]
 
     def steps(self) -> tuple[Floats, Floats]:
         """Quick boxes (steps, n) of each closed step."""
@@ -99,20 +87,6 @@ class Slicer:
         below = np.minimum(lo[:-1], lo[1:]) - self.swell
         above = np.maximum(hi[:-1], hi[1:]) + self.swell
         return np.nextafter(below, -np.inf), np.nextafter(above, np.inf)
-
-    def refined(self, p: Floats, limit: float, cells: int) -> float:
-        """Upper bound of one polynomial (N,), bisected until it is at most ``limit``."""
-        bounds = self.flow.bounds
-        best = bounds.refined_upper(p, limit, cells)
-        if self.flow.piece.chart.round:
-            # Bisection knows the box around the ball only.
-            linear = bounds.linear_part(p)
-            rest = p.copy()
-            rest[bounds.linear] = 0.0
-            straight = float(linear_bound(linear, *bounds.piece.ball))
-            total = straight + bounds.refined_upper(rest, limit - straight, cells)
-            best = min(best, float(np.nextafter(total, np.inf)))
-        return best
 
 
 def outline(slicer: Slicer, k: int, dims: tuple[int, int]) -> Floats:
@@ -130,18 +104,17 @@ def outline(slicer: Slicer, k: int, dims: tuple[int, int]) -> Floats:
     return np.asarray(points[ConvexHull(points).vertices] + middle)
 
 
-def hull(slices: Sequence[Slice]) -> tuple[Floats, Floats]:
+def hull(slices: Sequence[ReachSet]) -> tuple[Floats, Floats]:
     """Box (lo, hi), each (n,), around slices of any flows; only what decides a face is bisected."""
-    n = len(slices[0].out)
+    n = slices[0].dim
     lo, hi = np.zeros(n), np.zeros(n)
     lows, highs = [], []
     straight = []
     for s in slices:
-        bounds = s.slicer.flow.bounds
-        below, above = bounds.ranges(s.p)
+        below, above = s.bounds.ranges(s.p)
         lows.append(-below)
         highs.append(above)
-        nl, nh = bounds.nonlinear_radius(s.p)
+        nl, nh = s.bounds.nonlinear_radius(s.p)
         straight.append(nh - nl <= STRAIGHT * (above - below))
     for i in range(n):
         flat = [bool(row[i]) for row in straight]
@@ -150,9 +123,9 @@ def hull(slices: Sequence[Slice]) -> tuple[Floats, Floats]:
     return lo, hi
 
 
-def _face(slices: Sequence[Slice], i: int, sign: float, quick: Sequence[float], flat: Sequence[bool]) -> float:
+def _face(slices: Sequence[ReachSet], i: int, sign: float, quick: Sequence[float], flat: Sequence[bool]) -> float:
     """The largest of sign * state i over all slices, rounded up."""
-    out = [float(s.out[i]) for s in slices]
+    out = [float(s.box[i]) for s in slices]
     tops = [float(np.nextafter(q + o, np.inf)) for q, o in zip(quick, out, strict=True)]
     best = -np.inf
     for k in sorted(range(len(slices)), key=lambda k: -tops[k]):
@@ -160,8 +133,23 @@ def _face(slices: Sequence[Slice], i: int, sign: float, quick: Sequence[float], 
             break
         top = tops[k]
         if not flat[k]:
-            slicer = slices[k].slicer
-            finer = slicer.refined(sign * slices[k].p[i], best - out[k], slicer.cells)
+            finer = _refined(slices[k].bounds, sign * slices[k].p[i], best - out[k])
             top = min(top, float(np.nextafter(finer + out[k], np.inf)))
         best = max(best, top)
+    return best
+
+
+def _refined(bounds: PolynomialBounds, p: Floats, limit: float) -> float:
+    """Upper bound of one polynomial (N,), bisected until it is at most ``limit``."""
+    m = bounds.piece.variables
+    cells = int(np.clip(CELL_WORK / (len(bounds.exponents) * max(1, m * m)), LEAST_CELLS, MOST_CELLS))
+    best = bounds.refined_upper(p, limit, cells)
+    if bounds.piece.chart.round:
+        # Bisection knows the box around the ball only.
+        linear = bounds.linear_part(p)
+        rest = p.copy()
+        rest[bounds.linear] = 0.0
+        straight = float(linear_bound(linear, *bounds.piece.ball))
+        total = straight + bounds.refined_upper(rest, limit - straight, cells)
+        best = min(best, float(np.nextafter(total, np.inf)))
     return best
