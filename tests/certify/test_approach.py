@@ -8,9 +8,9 @@ import pytest
 import modegraph as mg
 from modegraph.certify.approach import approach_of, face_in_words
 from modegraph.certify.counterexamples.witnessed import witnessed
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.switching.common_time import Missed, Reach, find_crossings
 from modegraph.certify.targets.region import Region
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.unit import certify_unit
 from modegraph.certify.verdict import Approach, Witness

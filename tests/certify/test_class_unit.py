@@ -9,8 +9,8 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.class_unit import relate
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.relation import Relation
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.deadline import Deadline
 from modegraph.reach.failure import Mechanism
 from tests.certify.class_graphs import double_integrators, one_integrator

@@ -14,8 +14,7 @@ import modegraph as mg
 from modegraph.certify import course, decision
 from modegraph.certify.exploration import Exploration
 from modegraph.certify.findings import Findings
-from modegraph.certify.question import Question
-from modegraph.certify.targets.spec import TargetSpec
+from modegraph.certify.question import Question, TargetSpec
 from modegraph.certify.unit import UnitResult, certify_unit
 from modegraph.deadline import NEVER, Deadline
 from modegraph.reach.flow.flow import Flow

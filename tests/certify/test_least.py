@@ -11,8 +11,8 @@ import pytest
 import modegraph as mg
 from modegraph.certify.class_unit import relate
 from modegraph.certify.least import least
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.relation import Part, Relation
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.deadline import Deadline
 from tests.certify.class_graphs import one_integrator
 

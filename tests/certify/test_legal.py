@@ -54,10 +54,7 @@ def falling(limit: float) -> mg.Mode:
 
 def followed(mode: mg.Mode, end: float) -> Flow:
     compiled = compile_mode(mode, None)
-    flow = Flow(
-        compiled.fields, compiled.whole(), compiled.w_centre, compiled.w_radius, Order(1, 0),
-        names=compiled.loop.names, stops=compiled.stops,
-    )  # fmt: skip
+    flow = compiled.flow(compiled.whole(), Order(1, 0))
     flow.run(end)
     return flow
 

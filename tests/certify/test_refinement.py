@@ -6,8 +6,8 @@ import numpy as np
 
 import modegraph as mg
 from modegraph.certify.class_unit import relate
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.relation import Relation
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.deadline import Deadline
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import modegraph as mg
-from modegraph.certify.targets.spec import TargetSpec
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.unit import certify_unit
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.deadline import Deadline

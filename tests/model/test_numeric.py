@@ -1,23 +1,14 @@
-"""Calling functions with plain numbers."""
+"""Functions that give no plain numbers where the mode starts."""
 
 import numpy as np
 import pytest
 
 import modegraph as mg
 from modegraph.errors import ModegraphError
-from modegraph.model.numeric import call_numeric, require_finite_values
+from modegraph.model.numeric import require_finite_values
 from modegraph.model.start import mode_start
 
 PLANT = mg.System(lambda x, u: np.array([x[1], u[0]]), states=2, inputs=1)
-
-
-def test_injection_by_name():
-    available = {"x": 1.0, "r": 2.0}
-    assert call_numeric(lambda r, x, k=3.0: (r, x, k), available, role="f", owner="m") == (2.0, 1.0, 3.0)
-    with pytest.raises(ModegraphError, match="m, f reads an unknown argument 'y'; it may read x, r"):
-        call_numeric(lambda y: y, available, role="f", owner="m")
-    with pytest.raises(ModegraphError, match="m, f: KeyError"):
-        call_numeric(lambda x: {}["a"], available, role="f", owner="m")
 
 
 def check(controller, start=None, system=PLANT, **options):

@@ -8,7 +8,15 @@ import pytest
 
 from modegraph.reach.failure import Failure, Mechanism
 
-VALUES = {"time": 0.5, "label": "sqrt(x)", "state": "level", "rate": 0.25, "constraint": "speed"}
+VALUES = {
+    "time": 0.5,
+    "label": "sqrt(x)",
+    "state": "level",
+    "rate": 0.25,
+    "constraint": "speed",
+    "error": "IndexError",
+    "text": "5",
+}
 
 
 def example(mechanism: Mechanism) -> Failure:

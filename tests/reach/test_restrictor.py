@@ -114,8 +114,7 @@ def test_it_is_drawn_as_a_whole() -> None:
 def test_constraints_are_proved_for_every_reference_of_a_class() -> None:
     """|x - r| <= .75 holds from starts within .5 of r; with .4 it does not, for any r."""
     for limit, holds in ((0.75, True), (0.4, False)):
-        mode = linear()
-        mode.constraints = lambda x, r, c=limit: {"near": abs(x[0] - r[0]) <= c}
+        mode = linear().replace(constraints=lambda x, r, c=limit: {"near": abs(x[0] - r[0]) <= c})
         compiled = compile_mode(mode, None)
         flow = Flow(
             compiled.fields, compiled.whole(), compiled.w_centre, compiled.w_radius, Order(1, 0),

@@ -20,13 +20,13 @@ from modegraph.certify.legal import (
     width_over_time,
 )
 from modegraph.certify.proof import SafetyProof, certified_check
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.reason import Outcome, Reason
 from modegraph.certify.refinement import Links
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.base import least_slack
 from modegraph.certify.switching.zero_time import zero_time
 from modegraph.certify.targets.family import TargetClass, target_class
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.verdict import Floats, Status, Verdict
 from modegraph.deadline import Deadline
 from modegraph.errors import ModegraphError

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from modegraph.certify.targets.region import Region
+from modegraph.certify.verdict import Floats
 from modegraph.deadline import Deadline
 from modegraph.expression.tape import Tape
+from modegraph.model.mode import Mode
+from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.flow.flow import Order
 
@@ -17,6 +20,15 @@ LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
 LONGEST = 1000.0
 """Seconds of flow after which a mode without horizon and without a tail is given up."""
+
+
+@dataclass(frozen=True, eq=False)
+class TargetSpec:
+    """A target of a unit: a mode under the reference p (None: its whole class), or a `Target`."""
+
+    name: str
+    p: Floats | None
+    mode: Mode | Target
 
 
 @dataclass(frozen=True)

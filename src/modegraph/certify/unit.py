@@ -25,11 +25,10 @@ from modegraph.certify.decision import decide
 from modegraph.certify.findings import Findings
 from modegraph.certify.legal import width_over_time
 from modegraph.certify.proof import SwitchProof, certified_check, certified_switch
-from modegraph.certify.question import Goal, Question
+from modegraph.certify.question import Goal, Question, TargetSpec
 from modegraph.certify.reason import Outcome, Reason, point
 from modegraph.certify.switching.zero_time import InZeroTime
 from modegraph.certify.targets.region import Region
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.targets.sublevel import target_region
 from modegraph.certify.verdict import Approach, Floats, Status, Verdict, Witness
 from modegraph.deadline import Deadline

@@ -6,8 +6,8 @@ import math
 import time
 from dataclasses import dataclass, replace
 
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.references import Parameter
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.unit import certify_unit
 from modegraph.certify.verdict import Verdict
 from modegraph.cores import one_core

@@ -31,7 +31,8 @@ def impure(where: str, what: str) -> ModegraphError:
         f"{where} does not depend on its arguments alone: {what}. It is traced once and proved for what it was "
         "then, so it must not read random numbers, a clock or anything that changes between calls, and not tell "
         "traced values from numbers; draw such values once, outside of it, state what is not known as "
-        "disturbance= or unknowns=, and what the controller remembers as memory=mg.Memory(...)"
+        "disturbance= or unknowns=, and what the controller remembers as memory=mg.Memory(...). A formula that "
+        "cancels does the same: write it so that rounding changes only its last digits"
     )
 
 

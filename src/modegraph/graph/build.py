@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from modegraph.certify.class_unit import relate
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.reason import Outcome, Reason, engine_reason
 from modegraph.certify.relation import Relation
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.unit import UnitResult, certify_unit
 from modegraph.certify.verdict import Status, Verdict
 from modegraph.cores import COUNT, one_core, single_threaded_algebra

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from modegraph.certify.references import Parameter
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
-from modegraph.model.numeric import call_numeric
+from modegraph.model.plain_call import call_numeric
 from modegraph.model.sets.base import Set
 from modegraph.model.start import mode_start
 from modegraph.model.target import Target

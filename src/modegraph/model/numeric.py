@@ -1,45 +1,19 @@
-"""Calling a user's function with plain numbers, and checking that plain numbers come back."""
+"""Checking that a mode's functions give plain numbers where it starts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
+from modegraph.model.plain_call import call_numeric
 from modegraph.model.reference import Floats
 from modegraph.model.sets import Box, Set
 
 TYPICAL = 12
 """Points at which sizes are compared."""
-
-
-def call_numeric(function: Callable[..., Any], available: Mapping[str, object], *, role: str, owner: str) -> Any:
-    """Call a function with what it reads by name, untraced.
-
-    Parameters
-    ----------
-    available : {name: value}
-        What this role may read. A parameter with a default keeps it unless its name is listed here.
-    role, owner : str
-        For error messages, such as "controller" and "mode 'gentle'".
-
-    Raises
-    ------
-    ModegraphError
-        If the function asks for something else, or fails.
-    """
-    from modegraph.expression.trace import arguments
-
-    positional, keywords = arguments(function, available, role=role, owner=owner)
-    try:
-        return function(*positional, **keywords)
-    except ModegraphError as error:
-        raise type(error)(f"{owner}, {role}: {error}") from error
-    except Exception as error:
-        raise ModegraphError(f"{owner}, {role}: {type(error).__name__}: {error}") from error
 
 
 def require_finite_values(mode: Mode, p: Floats | None, start: Set) -> None:

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 
 from modegraph.errors import ModegraphError
 from modegraph.model.mode import Mode
-from modegraph.model.numeric import call_numeric
+from modegraph.model.plain_call import call_numeric
 from modegraph.model.reference import Floats
 from modegraph.model.sets import Set, Sublevel
 

@@ -138,7 +138,7 @@ class Trajectory(Reference):
         """
         from modegraph.expression.repeatable import Comparison, impure
         from modegraph.expression.scalar import Graph
-        from modegraph.model.numeric import call_numeric
+        from modegraph.model.plain_call import call_numeric
 
         graph = Graph()
         time = graph.variable("t")

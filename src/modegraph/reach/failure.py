@@ -54,7 +54,7 @@ class Mechanism(Kind):
         "the proof engine stopped with {error}: {text}",
         "please report it: this is a fault of modegraph, not of the model",
     )
-    ENGINE_LIMIT = "{text}", "{text}"
+    ENGINE_LIMIT = "{text}", "state the model as it says"
     # Cutting the starts.
     NO_MORE_CUTS = "no more are tried", _SHRINK
     CUTS_DO_NOT_HELP = "cutting it gets no further", _SHRINK

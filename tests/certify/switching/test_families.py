@@ -9,9 +9,9 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.class_unit import relate
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.families import OfEveryPair, OfPair
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.deadline import Deadline
 from tests.certify.class_graphs import one_integrator
 

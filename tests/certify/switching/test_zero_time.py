@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import modegraph as mg
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.switching.zero_time import InZeroTime, ZeroTime, zero_time
 from modegraph.certify.targets.region import Region
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.model.sets import Set, is_subset
 from modegraph.model.sets.rational import rational_subset
 from modegraph.reach.flow.flow import Order

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import modegraph as mg
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.switching.common_time import Reach, find_crossings
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.certify.targets.sublevel import SublevelRegion, target_region
 from modegraph.certify.unit import certify_unit
 from modegraph.certify.verdict import Status, Verdict

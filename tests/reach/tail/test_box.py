@@ -195,5 +195,5 @@ def test_an_invariant_set_keeps_its_constraints_where_it_begins() -> None:
     tail = search.attempt([flow])
     assert isinstance(tail, Tail)
     # All of the end is in the set: what is proved of the limit x <= 2 is no better than the end itself.
-    assert tail.face_upper[0] >= flow.end_box()[1][0] - 2.0
+    assert tail.face_upper[0] >= flow.last_set.ranges()[1][0] - 2.0
     assert tail.face_upper[0] >= tail.hi[0] - 2.0 - 1e-9

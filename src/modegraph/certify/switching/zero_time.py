@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.certify.legal import slack_until
+from modegraph.certify.question import TargetSpec
 from modegraph.certify.switching.base import Evidence, Nearest
 from modegraph.certify.switching.fit import Fit, Never, fit_of
 from modegraph.certify.switching.start_family import StartFamily, start_family
 from modegraph.certify.targets.region import Region
-from modegraph.certify.targets.spec import TargetSpec
 from modegraph.errors import ModegraphError
 from modegraph.expression.derivative import derivative
 from modegraph.model.mode import Mode
