@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from modegraph.enclosure.arguments import Jacobian
 from modegraph.enclosure.disturbance import STRAY, disturbance_columns
 from modegraph.enclosure.exponential import POWERS, exponential_terms, push_columns
 from modegraph.enclosure.monomials import monomials
@@ -28,13 +29,13 @@ def powers(xi: tuple[float, ...]) -> Any:
     return np.prod(np.array(xi) ** TABLE.exponents[:SIZE], axis=1)
 
 
-def loop(seed: int, n: int, scale: float) -> tuple[Any, Any, Any]:
+def loop(seed: int, n: int, scale: float) -> Jacobian:
     """(J, dJ, nJ): Jacobians that cancel much, with some curvature and some motion in time."""
     rng = np.random.default_rng(seed)
     J = rng.normal(size=(n * n, 2, SIZE)) * scale
     J[:, 0, 0] += STIFF[:n, :n].ravel() if seed % 2 else 0.0
     nJ = np.stack([np.abs(J[:, :, TABLE.degree[:SIZE] == d]).sum(axis=2) for d in range(Q + 1)], axis=2)
-    return J, np.full((n * n, 2), Q), nJ * (1 + 1e-12)
+    return Jacobian(J, np.full((n * n, 2), Q), nJ * (1 + 1e-12))
 
 
 @pytest.mark.parametrize("scale", SCALES)
@@ -42,12 +43,12 @@ def loop(seed: int, n: int, scale: float) -> tuple[Any, Any, Any]:
 def test_the_terms_of_the_exponential(scale: float, h: float) -> None:
     n = 3
     for seed in range(4):
-        J, dJ, nJ = loop(seed, n, scale)
+        jacobian = loop(seed, n, scale)
         v = np.random.default_rng(seed + 50).normal(size=(n, SIZE))
-        images, sizes, missed, beyond = exponential_terms(J, dJ, nJ, v, h, Q, TABLE.pairs, *TABLE.arrays)
+        images, sizes, missed, beyond = exponential_terms(jacobian, v, h, Q, TABLE.arrays)
         for xi in PLACES:
             at = powers(xi)
-            Z = h * (J[:, 0] @ at).reshape(n, n)
+            Z = h * (jacobian.J[:, 0] @ at).reshape(n, n)
             term, rest = v @ at, np.zeros(n)
             for k in range(40):
                 if k <= POWERS:
@@ -67,7 +68,7 @@ def test_what_lies_beyond_the_powers_that_are_formed() -> None:
     one = np.zeros((1, SIZE))
     one[0, 0] = 1.0
     nJ = np.array([[[40.0, 0.0, 0.0]]])
-    *_, beyond = exponential_terms(J, dJ, nJ, one, 0.1, Q, TABLE.pairs, *TABLE.arrays)
+    *_, beyond = exponential_terms(Jacobian(J, dJ, nJ), one, 0.1, Q, TABLE.arrays)
     true = math.exp(4.0) - sum(4.0**k / math.factorial(k) for k in range(POWERS + 1))
     assert true <= beyond[0] < 1.15 * true
 
@@ -80,11 +81,11 @@ def test_a_push_at_any_time(scale: float, h: float) -> None:
     rng = np.random.default_rng(1)
     x = np.linspace(0.0, 1.0, K)
     for seed in range(4):
-        J, dJ, nJ = loop(seed, n, scale)
-        chords, strays, tops = push_columns(J, dJ, nJ, n, h, Q, TABLE.pairs, *TABLE.arrays)
+        jacobian = loop(seed, n, scale)
+        chords, strays, tops = push_columns(jacobian, n, h, Q, TABLE.arrays)
         for xi in PLACES:
             at = powers(xi)
-            Z = h * (J[:, 0] @ at).reshape(n, n)
+            Z = h * (jacobian.J[:, 0] @ at).reshape(n, n)
             carried = np.stack([expm(Z * s) for s in x])
             assert (np.abs(carried).max(axis=0) <= tops * (1 + 1e-9) + 1e-12).all()
             for trial, c in product(range(8), range(n)):
@@ -110,12 +111,12 @@ def test_a_switched_disturbance(scale: float, h: float) -> None:
     x = ((np.arange(K)[:, None] + 0.5 + 0.5 * nodes) / K).ravel()
     dx = np.tile(0.5 * weights / K, K)
     for seed in range(4):
-        J, dJ, nJ = loop(seed, n, scale)
+        jacobian = loop(seed, n, scale)
         B = rng.normal(size=(nw, n, SIZE))
-        columns, outside, speed = disturbance_columns(J, dJ, nJ, B, radius, h, Q, TABLE.pairs, *TABLE.arrays)
+        columns, outside, speed = disturbance_columns(jacobian, B, radius, h, Q, TABLE.arrays)
         for xi in PLACES:
             at = powers(xi)
-            Z = h * (J[:, 0] @ at).reshape(n, n)
+            Z = h * (jacobian.J[:, 0] @ at).reshape(n, n)
             carried = np.stack([expm(Z * s) for s in x])
             for trial in range(12):
                 # Constant, bang-bang at random, and along the second and third column.

@@ -11,6 +11,7 @@ from flint import arb, ctx, fmpq
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from modegraph.enclosure import arguments
 from modegraph.enclosure.adjoint import tighten
 from modegraph.enclosure.jets import PLAIN, TOO_WIDE, solve_in_time
 from modegraph.enclosure.monomials import monomials
@@ -79,27 +80,28 @@ def stored(made: Program, start: np.ndarray, radius: np.ndarray) -> tuple[np.nda
     """P, R (the lesser of both bounds) and kinks for variables with the coefficients ``start`` (2, K+1, N)."""
     rows = np.array(made.rows, np.int64)
     count = len(rows)
-    const = np.array(made.const)
-    P, dg = np.zeros((count, K + 1, TABLE.size)), np.full((count, K + 1), -1, np.int64)
-    norms, R = np.zeros((count, K + 1, TABLE.order + 1)), np.zeros(count)
-    kinks, ranges = np.zeros((count, 2)), np.full((count, 2), np.nan)
-    P[:2] = start
+    tape = arguments.Program(rows, np.array(made.const), np.zeros(count), np.array([count - 1]), np.array([0, 1]))
+    space = arguments.Workspace(
+        P=np.zeros((count, K + 1, TABLE.size)),
+        dg=np.full((count, K + 1), -1, np.int64),
+        norms=np.zeros((count, K + 1, TABLE.order + 1)),
+        R=np.zeros(count),
+        kinks=np.zeros((count, 2)),
+        ranges=np.full((count, 2), np.nan),
+    )
+    space.P[:2] = start
     for v in range(2):
         for j in range(K + 1):
-            dg[v, j] = max((int(TABLE.degree[k]) for k in np.flatnonzero(start[v, j])), default=-1)
-    R[:2] = radius
-    outputs, variables = np.array([count - 1]), np.array([0, 1])
+            space.dg[v, j] = max((int(TABLE.degree[k]) for k in np.flatnonzero(start[v, j])), default=-1)
+    space.R[:2] = radius
     for _ in range(2):
-        solve_in_time(rows, const, kinks, ranges, outputs, variables, 0, P, dg, 1.0, K, CUT, *TABLE.arrays)
-        coefficient_norms(P, dg, norms, TABLE.start)
-        nothing = np.zeros(count)
-        _, A, local = remainders(
-            rows, const, nothing, kinks, ranges, P, dg, norms, R, K, CUT, TABLE.pairs, *TABLE.arrays
-        )
-        if not wants_another_try(rows, kinks, ranges):
+        solve_in_time(tape, space, 0, 1.0, CUT, TABLE.arrays)
+        coefficient_norms(space, TABLE.start)
+        _, A, local = remainders(tape, space, CUT, TABLE.arrays)
+        if not wants_another_try(rows, space):
             break
-    tighten(rows, const, nothing, kinks, np.arange(count), P, R, A, local)
-    return P, R, kinks
+    tighten(tape, np.arange(count), space, A, local)
+    return space.P, space.R, space.kinks
 
 
 def ball(x: Fraction) -> arb:

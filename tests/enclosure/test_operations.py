@@ -12,6 +12,7 @@ from flint import arb, arb_mat, ctx
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from modegraph.enclosure.arguments import Errors, Jacobian
 from modegraph.enclosure.disturbance import DROPPED, SET_VARIABLE, disturbance_bounds
 from modegraph.enclosure.monomials import monomials
 from modegraph.enclosure.polynomial import compose_into, multiply_into
@@ -52,7 +53,7 @@ def degree(c: np.ndarray) -> int:
 @given(VECTORS, VECTORS, st.integers(0, 3), st.sampled_from([1.0, -1.0, 0.1]))
 def test_a_product_is_the_truncated_product(a: np.ndarray, b: np.ndarray, top: int, factor: float) -> None:
     c = np.zeros(N)
-    multiply_into(c, a, degree(a), b, degree(b), top, factor, *TABLE.arrays)
+    multiply_into(c, a, degree(a), b, degree(b), top, factor, TABLE.arrays)
     true, size = [Fraction(0)] * N, [Fraction(0)] * N
     for i, j in product(range(N), repeat=2):
         if TABLE.degree[i] + TABLE.degree[j] <= top:
@@ -72,7 +73,7 @@ def test_a_composition_is_horners_polynomial(u: np.ndarray, series: list[float])
     u[0] = 0.0
     u[TABLE.degree > 1] = 0.0  # nothing is truncated then
     c = np.zeros(N)
-    compose_into(c, u, max(degree(u), 0), np.array(series), 3, np.zeros(N), *TABLE.arrays)
+    compose_into(c, u, max(degree(u), 0), np.array(series), 3, np.zeros(N), TABLE.arrays)
     for xi in CORNERS:
         y = exact(u, xi)
         true = sum(Fraction(s) * y**k for k, s in enumerate(series))
@@ -87,7 +88,7 @@ def test_transported_generators_hold_the_exact_product(n: int, q: int, seed: int
     size = int(TABLE.start[q + 1])
     F = rng.normal(size=(n, n, size)) * (rng.random((n, n, size)) < 0.8)
     G = rng.normal(size=(3, n, size)) * (rng.random((3, n, size)) < 0.7) * scale
-    H, lost = advance_generators(F, G, q, TABLE.pairs, *TABLE.arrays)
+    H, lost = advance_generators(F, G, q, TABLE.arrays)
     for xi in CORNERS:
         for r in range(n):
             off = Fraction(0)
@@ -104,7 +105,8 @@ def test_what_a_matrix_drops_from_a_vector(seed: int, factor: float) -> None:
     n, q = 2, 2
     size = int(TABLE.start[q + 1])
     J, v = rng.normal(size=(n * n, 1, size)), rng.normal(size=(n, size)) * (rng.random((n, size)) < 0.7)
-    out, lost = apply_matrix(J, np.full((n * n, 1), q), v, n, q, factor, *TABLE.arrays)
+    jacobian = Jacobian(J, np.full((n * n, 1), q), np.zeros((n * n, 1, q + 1)))
+    out, lost = apply_matrix(jacobian, v, n, q, factor, TABLE.arrays)
     for xi, i in product(CORNERS, range(n)):
         true = sum(exact(J[i * n + k, 0], xi) * exact(v[k], xi) for k in range(n)) * Fraction(factor)
         rounding = Fraction(gamma(n * TABLE.pairs + 4)) * Fraction(abs(factor)) * 100
@@ -135,8 +137,8 @@ def test_the_defect_of_the_fundamental_matrix(KP: int, q: int, uncertain: float)
         J = rng.normal(size=(n * n, KJ + 1, size)) * scale
         dJ = np.full((n * n, KJ + 1), q)
         norms = np.stack([np.abs(J[:, :, TABLE.degree[:size] == d]).sum(axis=2) for d in range(q + 1)], axis=2)
-        end, sup, last, bend, tails = fundamental_matrix(J, dJ, n, h, KJ, KP, q, *TABLE.arrays)
-        E = fundamental_defect(norms, np.full(n * n, uncertain), sup, tails, n, h, KJ, KP, q, TABLE.pairs)
+        end, sup, last, bend, tails = fundamental_matrix(Jacobian(J, dJ, norms), n, h, KP, q, TABLE.arrays)
+        E = fundamental_defect(norms, np.full(n * n, uncertain), sup, tails, n, h, KP, q, TABLE.pairs)
         S = _fundamental(J.reshape(n, n, KJ + 1, size), h, KP, q)
         for xi in [*product((-1.0, 1.0), (-1.0, 1.0)), (0.3, -0.6)]:
             at = np.prod(np.array(xi) ** TABLE.exponents[:size], axis=1)
@@ -187,14 +189,14 @@ def test_growth_bounds_satisfy_their_inequality(n: int, seed: int, scale: float)
 @pytest.mark.parametrize("radius", [0.5, 1e-300])
 def test_the_mean_of_the_disturbance_matrix(radius: float) -> None:
     """df/dw = b0 + b1 s + b2 s^2 + c xi + e error + d s xi^2 with xi, error, s free."""
-    embed, owner = np.array([0, 1]), np.array([SET_VARIABLE, SET_VARIABLE, 0, DROPPED])
+    errors = Errors(np.array([0, 1]), np.array([SET_VARIABLE, SET_VARIABLE, 0, DROPPED]), np.array([2]))
     rng = np.random.default_rng(2)
     for _ in range(40):
         Q = np.zeros((1, 3, 4))
         Q[0, :, 0], Q[0, 0, 1:] = rng.normal(size=3), rng.normal(size=3)
         Q[0, 1, 3] = rng.normal()
         off = 0.125
-        B, miss = disturbance_bounds(Q, np.array([off]), np.array([0]), 0, 1, np.array([radius]), 2, embed, owner)
+        B, miss = disturbance_bounds(Q, np.array([off]), np.array([0]), 0, 1, np.array([radius]), errors)
         for s, xi, e, two in product(np.linspace(0.0, 1.0, 11), (-1.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)):
             true = s ** np.arange(3) @ Q[0] @ np.array([1.0, xi, e, two]) + off * e
             mean = B[0, 0] @ np.array([1.0, xi])

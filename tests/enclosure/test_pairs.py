@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from modegraph.enclosure.arguments import Instants, Rows, Targets
 from modegraph.enclosure.pairs import affine_centres, first_crossings, part_gauges
 
 
@@ -45,20 +46,17 @@ class Table:
         self.limit = rng.uniform(0.5, 1.0, 1 if self.is_round else f)
         # Half of all pairs are inside.
         source, target = rng.uniform(-1.0, 1.0, (200, self.k)), rng.uniform(-1.0, 1.0, (200, self.n))
-        found = first_crossings(source, target, self.classes(), *self.target(target), *self.arguments, False)
+        found = first_crossings(source, target, self.classes(), *self.arguments(target), False)
         self.limit *= np.median(found[0])
 
-    def target(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        found = affine_centres(target, np.zeros(self.n), np.eye(self.n), np.zeros(self.n), self.limit)
-        return found[0], found[1], found[2]
-
-    @property
-    def arguments(self) -> tuple[Any, ...]:
-        return (
-            self.rows, self.slack, self.is_round, 1.0, self.part_flows, self.lo, self.hi, self.middle, self.scale,
-            self.flow_terms, self.exponents, self.flow_instants, self.flow_coefficients, self.coefficients.ravel(),
-            self.farthest, self.size, self.spread,
+    def arguments(self, target: np.ndarray) -> tuple[Targets, Rows, Instants]:
+        there = affine_centres(target, np.zeros(self.n), np.eye(self.n), np.zeros(self.n), self.limit)
+        instants = Instants(
+            self.part_flows, self.lo, self.hi, self.middle, self.scale, self.flow_terms, self.exponents,
+            self.flow_instants, self.flow_coefficients, self.coefficients.ravel(), self.farthest, self.size,
+            self.spread,
         )  # fmt: skip
+        return Targets(*there), Rows(self.rows, self.slack, self.is_round, 1.0), instants
 
     def classes(self) -> Any:
         return (-np.ones((1, self.k)), np.ones((1, self.k))), (-np.ones((1, self.n)), np.ones((1, self.n)))
@@ -103,7 +101,7 @@ def test_gauges_are_upper_bounds_and_sharp(table: Table) -> None:
     rng = np.random.default_rng(5)
     source, target = rng.uniform(-1.0, 1.0, (20, table.k)), rng.uniform(-1.0, 1.0, (20, table.n))
     for part in range(3):
-        found = part_gauges(part, source, *table.target(target), *table.arguments)
+        found = part_gauges(part, source, *table.arguments(target))
         for b in range(20):
             exact = table.exact(part, source[b], target[b])
             assert len(exact) == found.shape[1]
@@ -115,7 +113,7 @@ def test_gauges_are_upper_bounds_and_sharp(table: Table) -> None:
 def test_a_pair_is_certified_by_an_instant_of_every_part_that_has_starts(table: Table) -> None:
     rng = np.random.default_rng(6)
     source, target = rng.uniform(-1.0, 1.0, (60, table.k)), rng.uniform(-1.0, 1.0, (60, table.n))
-    gauge, instant = first_crossings(source, target, table.classes(), *table.target(target), *table.arguments, False)
+    gauge, instant = first_crossings(source, target, table.classes(), *table.arguments(target), False)
     certified = 0
     for b in range(60):
         parts = [part for part in range(3) if part < 2 or (source[b] >= 0.0).all()]
@@ -139,7 +137,7 @@ def test_a_quick_look_decides_the_same(table: Table) -> None:
     rng = np.random.default_rng(7)
     source, target = rng.uniform(-1.0, 1.0, (400, table.k)), rng.uniform(-1.0, 1.0, (400, table.n))
     whole, quick = (
-        first_crossings(source, target, table.classes(), *table.target(target), *table.arguments, fast)[0] <= 1.0
+        first_crossings(source, target, table.classes(), *table.arguments(target), fast)[0] <= 1.0
         for fast in (False, True)
     )
     assert (whole == quick).all()
@@ -151,12 +149,12 @@ def test_nothing_is_said_outside_the_classes_or_of_what_is_not_a_number(table: T
     source, target = np.zeros((4, table.k)), np.zeros((4, table.n))
     table.limit[:] = 1e6
     source[1, 0], target[2, -1], source[3, 0] = 1.0 + 1e-15, -1.1, np.nan
-    gauge, _ = first_crossings(source, target, table.classes(), *table.target(target), *table.arguments, False)
+    gauge, _ = first_crossings(source, target, table.classes(), *table.arguments(target), False)
     assert gauge[0] <= 1.0
     assert np.isinf(gauge[1:]).all()
     table.coefficients[:, 0, 0] = np.nan
     for fast in (False, True):
-        gauge, _ = first_crossings(source, target, table.classes(), *table.target(target), *table.arguments, fast)
+        gauge, _ = first_crossings(source, target, table.classes(), *table.arguments(target), fast)
         assert np.isinf(gauge).all()
 
 
@@ -166,8 +164,8 @@ def test_a_face_without_room_must_be_met_exactly() -> None:
     table.coefficients[:] = 0.0
     table.spread[:] = 0.0
     source, target = np.zeros((1, 1)), np.zeros((1, 1))
-    assert np.isinf(part_gauges(0, source, *table.target(target), *table.arguments)).all()
+    assert np.isinf(part_gauges(0, source, *table.arguments(target))).all()
     table.coefficients[:, :, 0] = -1.0
-    assert (part_gauges(0, source, *table.target(target), *table.arguments) == 0.0).all()
+    assert (part_gauges(0, source, *table.arguments(target)) == 0.0).all()
     table.limit[:] = -2.0
-    assert np.isinf(part_gauges(0, source, *table.target(target), *table.arguments)).all()
+    assert np.isinf(part_gauges(0, source, *table.arguments(target))).all()

@@ -50,22 +50,22 @@ KERNEL_FAULTS = (
     Fault(
         "a part without starts for a reference is asked of another",
         "enclosure/pairs.py",
-        "if not _within(source, b, lo, hi, part):",
-        "if part > 0 and not _within(source, b, lo, hi, part - 1):",
+        "if not _within(source, b, table.lo, table.hi, part):",
+        "if part > 0 and not _within(source, b, table.lo, table.hi, part - 1):",
         ("tests/enclosure/test_pairs.py",),
     ),
     Fault(
         "the remainder of a product forgets what it truncates",
         "enclosure/remainder.py",
-        "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]",
+        "own = truncated_part(norms[a], tails[b], tails[a], cut, np.int64(0)) + gamma * A[a] * A[b]",
         "own = gamma * A[a] * A[b]",
         (NODES + "test_random_expressions",),
     ),
     Fault(
         "the remainder of a product forgets its rounding",
         "enclosure/remainder.py",
-        "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]",
-        "own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0))",
+        "own = truncated_part(norms[a], tails[b], tails[a], cut, np.int64(0)) + gamma * A[a] * A[b]",
+        "own = truncated_part(norms[a], tails[b], tails[a], cut, np.int64(0))",
         (NODES + "test_random_expressions",),
     ),
     Fault(

@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from modegraph.certify.moments import Moments
 from modegraph.certify.switching.zero_time import ZeroTime
 from modegraph.certify.targets.family import TargetClass
+from modegraph.enclosure.arguments import Instants, Rows, Targets
 from modegraph.enclosure.pairs import ROUNDED, first_crossings, part_gauges
 from modegraph.model.sets import Box
 
@@ -174,8 +174,8 @@ class Relation:
 
     def _decided(self, source: Floats, target: Floats, quick: bool) -> tuple[Floats, NDArray[np.int64]]:
         found = first_crossings(
-            np.ascontiguousarray(source), np.ascontiguousarray(target), self._classes, *self.goal.at(target),
-            *self._table, quick,
+            np.ascontiguousarray(source), np.ascontiguousarray(target), self._classes, Targets(*self.goal.at(target)),
+            self._rows, self._table, quick,
         )  # fmt: skip
         return found[0], found[1]
 
@@ -192,24 +192,33 @@ class Relation:
         return np.vstack([rows, np.zeros((1, 2))])
 
     @cached_property
-    def _table(self) -> tuple[Any, ...]:
-        """The target's rows and the instants of all parts, as the kernels of `enclosure.pairs` want them."""
-        flows = [flow for part in self.parts for flow in part.flows]
+    def _rows(self) -> Rows:
         goal = self.goal
+        return Rows(np.ascontiguousarray(goal.rows, float), goal.slack, goal.round, goal.grow)
+
+    @cached_property
+    def _table(self) -> Instants:
+        """The instants of all parts, as the kernels of `enclosure.pairs` want them."""
+        flows = [flow for part in self.parts for flow in part.flows]
 
         def firsts(counts: Sequence[int]) -> NDArray[np.int64]:
             return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
-        return (
-            np.ascontiguousarray(goal.rows, float), goal.slack, goal.round, goal.grow,
-            firsts([len(part.flows) for part in self.parts]),
-            np.stack([part.flows[0].lo for part in self.parts]), np.stack([part.flows[0].hi for part in self.parts]),
-            np.stack([f.middle for f in flows]), np.stack([f.scale for f in flows]),
-            firsts([len(f.exponents) for f in flows]), np.concatenate([f.exponents for f in flows]),
-            firsts([len(f.times) for f in flows]), firsts([f.rows.size for f in flows]),
-            np.concatenate([f.rows.ravel() for f in flows]), np.array([f.farthest for f in flows]),
-            np.concatenate([f.size for f in flows]), np.concatenate([f.spread for f in flows]),
-        )  # fmt: skip
+        return Instants(
+            part_flows=firsts([len(part.flows) for part in self.parts]),
+            lo=np.stack([part.flows[0].lo for part in self.parts]),
+            hi=np.stack([part.flows[0].hi for part in self.parts]),
+            middle=np.stack([f.middle for f in flows]),
+            scale=np.stack([f.scale for f in flows]),
+            flow_terms=firsts([len(f.exponents) for f in flows]),
+            exponents=np.concatenate([f.exponents for f in flows]),
+            flow_instants=firsts([len(f.times) for f in flows]),
+            flow_coefficients=firsts([f.rows.size for f in flows]),
+            coefficients=np.concatenate([f.rows.ravel() for f in flows]),
+            farthest=np.array([f.farthest for f in flows]),
+            size=np.concatenate([f.size for f in flows]),
+            spread=np.concatenate([f.spread for f in flows]),
+        )
 
     def refuted(self, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """Pairs (B,) for which a start of i is proved to rest outside S_j for ever."""
@@ -250,9 +259,9 @@ class Relation:
         flat = z.reshape(-1, z.shape[2])
         source, target = np.ascontiguousarray(flat[:, : self.source]), flat[:, self.source :]
         certified = np.full(B, bool(self.parts))
-        there = self.goal.at(target)
+        there = Targets(*self.goal.at(target))
         for k, part in enumerate(self.parts):
-            found = part_gauges(k, source, *there, *self._table)
+            found = part_gauges(k, source, there, self._rows, self._table)
             worst = found.reshape(B, count, -1).max(axis=1)
             apart = ~part.meets(lo[0], hi[0])
             certified &= (worst.min(axis=1) <= 1.0) | apart

@@ -33,7 +33,7 @@ def _add_product(low, high, k, a, b, c, d):
 
 
 @njit(**KERNEL)
-def tighten(ops, const, const_rad, kinks, outputs, P, R, A, local):
+def tighten(program, outputs, space, A, local):
     """Replace R of the outputs by their adjoint bound where that is smaller.
 
     ``local[q]`` bounds what node q adds itself, for arguments that equal their stored polynomials; A[q]
@@ -44,6 +44,8 @@ def tighten(ops, const, const_rad, kinks, outputs, P, R, A, local):
     polynomial, so an output moves by at most ``local`` times the largest sensitivity over those ranges.
     Nodes without a derivative here are exchanged first, like inputs, by R.
     """
+    ops, const, const_rad, _, _ = program
+    P, R, kinks = space.P, space.R, space.kinks
     nodes = ops.shape[0]
     below = np.empty(nodes)
     above = np.empty(nodes)

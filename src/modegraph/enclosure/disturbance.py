@@ -25,12 +25,14 @@ STRAY = (0.0, 0.0, 0.0321, 0.0162, 0.0047, 0.00099, 0.00017)
 
 
 @njit(**KERNEL)
-def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
+def disturbance_bounds(Q, RQ, outputs, first, n, radius, errors):
     """Mean over the step of each column of df/dw, its sup, and the radius of what the mean misses.
 
     Output node ``outputs[first + i * nw + j]`` is df_i/dw_j. Returns B (nw, n, Nq) and miss (n,) =
     sup |df/dw - B| wr.
     """
+    embed, owner, _ = errors
+    KJ = Q.shape[1] - 1
     nw = radius.size
     Nq = embed.size
     B = np.zeros((nw, n, Nq))
@@ -58,21 +60,19 @@ def disturbance_bounds(Q, RQ, outputs, first, n, radius, KJ, embed, owner):
 
 
 @njit(**KERNEL)
-def disturbance_columns(J, dJ, nJ, B, radius, h, q, pairs, product, offset, start, degree):
+def disturbance_columns(jacobian, B, radius, h, q, table):
     """u' = h J(0, xi) u + h B(xi) v, |v| <= radius, gives u(1) = int_0^1 exp(Z x) h B v dx, Z = h J(0, xi).
 
     Of x^k / k! in the exponential its mean acts on int v, its slope on int (x - 1/2) v, at most radius / 4,
     and for k = 2 the rest on one more number: three columns an input (nw, 3, n, Nq). Then a box (n,) for what
-    is left, and a bound (n,) of |u(s)| / s. nJ (n*n, KJ+1, q+1): norms of J by degree, upward.
+    is left, and a bound (n,) of |u(s)| / s.
     """
     nw, n, Nq = B.shape
     outside = np.zeros(n)
     speed = np.zeros(n)
     columns = np.zeros((nw, 3, n, Nq))
     for j in range(nw):
-        images, sizes, missed, beyond = exponential_terms(
-            J, dJ, nJ, B[j], h, q, pairs, product, offset, start, degree
-        )  # fmt: skip
+        images, sizes, missed, beyond = exponential_terms(jacobian, B[j], h, q, table)
         weight = h * radius[j]
         for i in range(n):
             s = beyond[i] / (POWERS + 2)

@@ -16,17 +16,18 @@ MOST_POWERS, NEGLIGIBLE = 200, 1e-18
 
 
 @njit(**KERNEL)
-def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, degree):
+def exponential_terms(jacobian, vector, h, q, table):
     """Z^k v for k = 0 .. POWERS: polynomials (POWERS+1, n, Nq), their norms and what they miss (POWERS+1, n), and
     a bound (n,) of |Z^k v| / k! summed over all higher k.
 
-    v (n, Nq). nJ (n*n, KJ+1, q+1): norms of J by degree, upward.
+    v (n, Nq).
     """
+    nJ = jacobian.nJ
     n, Nq = vector.shape
     images = np.zeros((POWERS + 1, n, Nq))
     sizes = np.zeros((POWERS + 1, n))
     missed = np.zeros((POWERS + 1, n))
-    gamma = 1.01 * (n * pairs + 2 * n + 16) * UNIT
+    gamma = 1.01 * (n * table.pairs + 2 * n + 16) * UNIT
     # |Z| entrywise, and its infinity norm.
     Y = np.zeros((n, n))
     norm = 0.0
@@ -44,7 +45,7 @@ def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, de
             images[0, i, l] = vector[i, l]
     for k in range(POWERS + 1):
         if k > 0:
-            image, lost = apply_matrix(J, dJ, images[k - 1], n, q, h, product, offset, start, degree)
+            image, lost = apply_matrix(jacobian, images[k - 1], n, q, h, table)
             for i in range(n):
                 for l in range(Nq):
                     images[k, i, l] = image[i, l]
@@ -83,14 +84,14 @@ def exponential_terms(J, dJ, nJ, vector, h, q, pairs, product, offset, start, de
 
 
 @njit(**KERNEL)
-def push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree):
+def push_columns(jacobian, n, h, q, table):
     """y' = h J(0, xi) y + c' with |c'_i| of integral at most 1, in one i at a time.
 
     A push at x before the end ends as exp(Z x) e_i, which is near the chord from e_i to exp(Z) e_i. Returns
     columns for the middle and half of each chord (n, 2, n, Nq), row i for a push in i; boxes (n, n) for what is
     not on it, column i for a push in i; and bounds (n, n) of |y| during the step.
     """
-    Nq = J.shape[2]
+    Nq = jacobian.J.shape[2]
     chords = np.zeros((n, 2, n, Nq))
     strays = np.zeros((n, n))
     tops = np.zeros((n, n))
@@ -98,7 +99,7 @@ def push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree):
     for c in range(n):
         unit[:] = 0.0
         unit[c, 0] = 1.0
-        images, sizes, missed, beyond = exponential_terms(J, dJ, nJ, unit, h, q, pairs, product, offset, start, degree)
+        images, sizes, missed, beyond = exponential_terms(jacobian, unit, h, q, table)
         for i in range(n):
             off = beyond[i]
             whole = 0.0

@@ -47,12 +47,15 @@ def constant_radius(c, deg, start):
 
 
 @njit(**KERNEL)
-def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, product, offset, start, degree):
+def node_coefficient(q, j, program, space, dmax, w1, w2, series, table):
     """Set P[q, j] and its degree dg[q, j] from lower coefficients, truncated at degree dmax.
 
     kinks[q] = (alpha, beta): relu(a) is stored as alpha a + beta, step(a) as the constant alpha; an
     elementary function with alpha = PLAIN as the constant beta.
     """
+    ops, const = program.ops, program.const
+    P, dg, kinks = space.P, space.dg, space.kinks
+    start = table.start
     op = ops[q, 0]
     a = ops[q, 1]
     b = ops[q, 2]
@@ -115,7 +118,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             da = dg[a, i]
             db = dg[b, j - i]
             if da >= 0 and db >= 0:
-                multiply_into(c, P[a, i], da, P[b, j - i], db, dmax, 1.0, product, offset, start, degree)
+                multiply_into(c, P[a, i], da, P[b, j - i], db, dmax, 1.0, table)
                 d = max(d, min(dmax, da + db))
     elif op == SQR:
         for i in range(j // 2 + 1):
@@ -123,7 +126,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             db = dg[a, j - i]
             if da >= 0 and db >= 0:
                 f = 1.0 if 2 * i == j else 2.0
-                multiply_into(c, P[a, i], da, P[a, j - i], db, dmax, f, product, offset, start, degree)
+                multiply_into(c, P[a, i], da, P[a, j - i], db, dmax, f, table)
                 d = max(d, min(dmax, da + db))
     elif op == RECIP:
         if j == 0:
@@ -134,12 +137,12 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             while right < dmax + 1 and da > 0:
                 right *= 2
                 w1[:] = 0.0
-                multiply_into(w1, c, d, P[a, 0], da, dmax, -1.0, product, offset, start, degree)
+                multiply_into(w1, c, d, P[a, 0], da, dmax, -1.0, table)
                 w1[0] += 1.0
                 for k in range(size):
                     w2[k] = c[k]
                 dn = min(dmax, d + da)
-                multiply_into(c, w2, d, w1, dn, dmax, 1.0, product, offset, start, degree)
+                multiply_into(c, w2, d, w1, dn, dmax, 1.0, table)
                 d = min(dmax, d + dn)
         else:
             w1[:] = 0.0
@@ -148,10 +151,10 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
                 da = dg[a, i]
                 db = dg[q, j - i]
                 if da >= 0 and db >= 0:
-                    multiply_into(w1, P[a, i], da, P[q, j - i], db, dmax, -1.0, product, offset, start, degree)
+                    multiply_into(w1, P[a, i], da, P[q, j - i], db, dmax, -1.0, table)
                     dt = max(dt, min(dmax, da + db))
             if dt >= 0:
-                multiply_into(c, P[q, 0], dg[q, 0], w1, dt, dmax, 1.0, product, offset, start, degree)
+                multiply_into(c, P[q, 0], dg[q, 0], w1, dt, dmax, 1.0, table)
                 d = min(dmax, dt + dg[q, 0])
     elif j == 0:
         da = max(0, min(dg[a, 0], dmax))
@@ -159,7 +162,7 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
         for k in range(size):
             w2[k] = P[a, 0, k]
         w2[0] = 0.0
-        d = compose_into(c, w2, da, series, dmax, w1, product, offset, start, degree)
+        d = compose_into(c, w2, da, series, dmax, w1, table)
     else:
         # f(a)' = g a' with g the partner: cos for sin, -sin for cos, exp itself, 1/a, 1/(1 + a^2).
         g = q if op == EXP else b
@@ -169,13 +172,13 @@ def node_coefficient(q, j, ops, const, kinks, P, dg, dmax, w1, w2, series, produ
             db = dg[g, j - i]
             if da >= 0 and db >= 0:
                 f = sign * (i / j)
-                multiply_into(c, P[a, i], da, P[g, j - i], db, dmax, f, product, offset, start, degree)
+                multiply_into(c, P[a, i], da, P[g, j - i], db, dmax, f, table)
                 d = max(d, min(dmax, da + db))
     dg[q, j] = d
 
 
 @njit(**KERNEL)
-def propose_kinks(ops, P, dg, ranges, kinks, start):
+def propose_kinks(ops, ranges, kinks):
     """Choose the stored form of relu and step nodes from the ranges [lo, hi] of their arguments."""
     for q in range(ops.shape[0]):
         op = ops[q, 0]
@@ -205,38 +208,40 @@ def propose_kinks(ops, P, dg, ranges, kinks, start):
 
 
 @njit(**KERNEL)
-def decide_kink(q, ops, P, dg, kinks, ranges, start):
+def decide_kink(q, ops, space, start):
     """Where no range was known, take that of the argument at the start of the step."""
-    if (ops[q, 0] == RELU or ops[q, 0] == STEP) and math.isnan(kinks[q, 0]):
+    if (ops[q, 0] == RELU or ops[q, 0] == STEP) and math.isnan(space.kinks[q, 0]):
         a = ops[q, 1]
-        mid = P[a, 0, 0]
-        r = constant_radius(P[a, 0], max(dg[a, 0], 0), start)
-        ranges[q, 0] = mid - r
-        ranges[q, 1] = mid + r
-        propose_kinks(ops[q : q + 1], P, dg, ranges[q : q + 1], kinks[q : q + 1], start)
+        mid = space.P[a, 0, 0]
+        r = constant_radius(space.P[a, 0], max(space.dg[a, 0], 0), start)
+        space.ranges[q, 0] = mid - r
+        space.ranges[q, 1] = mid + r
+        propose_kinks(ops[q : q + 1], space.ranges[q : q + 1], space.kinks[q : q + 1])
 
 
 @njit(**KERNEL)
-def solve_in_time(
-    ops, const, kinks, ranges, outputs, variables, states, P, dg, h, K, cut, product, offset, start, degree
-):
+def solve_in_time(program, space, states, h, cut, table):
     """Coefficients 0..K of every node; with ``states`` > 0 those of the solution of x' = f(x) too.
 
     P[variables[i], 0] holds the start; coefficient j + 1 of state i is h f_i,j / (j + 1), f_i being
     outputs[i]. With states = 0 the coefficients of all variables are given. Coefficient j is
-    truncated at degree cut[j].
+    truncated at degree cut[j] (K+1,).
     """
+    ops, outputs, variables = program.ops, program.outputs, program.variables
+    P, dg = space.P, space.dg
+    start = table.start
+    K = cut.size - 1
     w1 = P[0, 0].copy()
     w2 = P[0, 0].copy()
     series = P[0, 0].copy()
     if series.size < start.size:
         series = start * 0.0
-    propose_kinks(ops, P, dg, ranges, kinks, start)
+    propose_kinks(ops, space.ranges, space.kinks)
     for j in range(K + 1):
         for q in range(ops.shape[0]):
             if j == 0:
-                decide_kink(q, ops, P, dg, kinks, ranges, start)
-            node_coefficient(q, j, ops, const, kinks, P, dg, cut[j], w1, w2, series, product, offset, start, degree)
+                decide_kink(q, ops, space, start)
+            node_coefficient(q, j, program, space, cut[j], w1, w2, series, table)
         if j < K:
             for i in range(states):
                 v = variables[i]

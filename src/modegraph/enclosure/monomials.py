@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.enclosure.arguments import Table
 from modegraph.enclosure.rounding import MAX_MONOMIALS
 from modegraph.errors import ModegraphError
 
@@ -55,9 +56,9 @@ class Monomials:
         return len(self.degree)
 
     @property
-    def arrays(self) -> tuple[NDArray[np.uint32], Ints, Ints, Ints]:
-        """What the kernels take: (product, offset, start, degree)."""
-        return self.product, self.offset, self.start, self.degree
+    def arrays(self) -> Table:
+        """What the kernels take."""
+        return Table(self.product, self.offset, self.start, self.degree, self.pairs)
 
 
 def monomial_count(weights: tuple[int, ...], order: int) -> int:

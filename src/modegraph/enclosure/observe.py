@@ -16,16 +16,16 @@ from modegraph.enclosure.variational import chord_distance
 
 
 @njit(**SHORT)
-def observe_step(
-    fP, fdg, fnorms, fvariables, ops, const, const_rad, outputs, variables, radius, h, KQ, cut, pairs,
-    Q, dq, nQ, RQ, kinks, ranges, product, offset, start, degree,
-):  # fmt: skip
-    """Evaluate a tape along the step just taken, for inputs within ``radius`` of their polynomials.
+def observe_step(flown, flown_variables, program, radius, h, cut, space, table):
+    """Evaluate a program along the step ``flown`` just taken, for inputs within ``radius`` of their polynomials.
 
     Returns, per output: its polynomial at s = 0 and at s = 1, its mean over the step (each (no, Nq)),
     and ``slack`` (no, 2): what the true value may exceed the larger of the two ends by at any s, and
     the radius around the mean of the true mean. Infinite where the output is undefined.
     """
+    outputs, variables, start = program.outputs, program.variables, table.start
+    Q, nQ, RQ, ranges = space.P, space.norms, space.R, space.ranges
+    KQ = cut.size - 1
     count = outputs.size
     q = cut[0]
     Nq = Q.shape[2]
@@ -33,7 +33,7 @@ def observe_step(
     embed = np.zeros(Nq, np.int64)
     for k in range(Nq):
         embed[k] = k
-    truncate_inputs(fP, fdg, fnorms, fvariables, Q, dq, variables, KQ, q, embed, start, lost)
+    truncate_inputs(flown, flown_variables, space, variables, KQ, q, embed, start, lost)
     for v in range(variables.size):
         RQ[variables[v]] = (lost[v] + radius[v]) * UP
     for r in range(ranges.shape[0]):
@@ -41,17 +41,12 @@ def observe_step(
         ranges[r, 1] = np.nan
     A = local = RQ
     for _attempt in range(2):
-        solve_in_time(
-            ops, const, kinks, ranges, outputs, variables, np.int64(0), Q, dq, h, KQ,
-            cut, product, offset, start, degree,
-        )  # fmt: skip
-        coefficient_norms(Q, dq, nQ, start)
-        _, A, local = remainders(
-            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, KQ, cut, pairs, product, offset, start, degree
-        )
-        if not wants_another_try(ops, kinks, ranges):
+        solve_in_time(program, space, np.int64(0), h, cut, table)
+        coefficient_norms(space, start)
+        _, A, local = remainders(program, space, cut, table)
+        if not wants_another_try(program.ops, space):
             break
-    tighten(ops, const, const_rad, kinks, outputs, Q, RQ, A, local)
+    tighten(program, outputs, space, A, local)
     ends = np.zeros((3, count, Nq))
     slack = np.zeros((count, 2))
     for i in range(count):
@@ -105,15 +100,15 @@ def observed_bounds(ends, slack, faces, kinds, linear, radius, middle, rounding)
 
 
 @njit(**SHORT)
-def enclose_at(
-    ops, const, const_rad, outputs, variables, p, radius, cut, pairs,
-    Q, dq, nQ, RQ, kinks, ranges, product, offset, start, degree,
-):  # fmt: skip
+def enclose_at(program, p, radius, cut, space, table):
     """Evaluate a tape at one instant: inputs within ``radius`` of the polynomials p (nv, N).
 
     Returns the outputs' polynomials (no, N), their radii (no,) (inf: undefined) and the first
     undefined node or -1.
     """
+    outputs, variables = program.outputs, program.variables
+    Q, dq, RQ, ranges = space.P, space.dg, space.R, space.ranges
+    start, degree = table.start, table.degree
     count = outputs.size
     for v in range(variables.size):
         b = variables[v]
@@ -131,17 +126,12 @@ def enclose_at(
         ranges[r, 1] = np.nan
     A = local = RQ
     for _attempt in range(2):
-        solve_in_time(
-            ops, const, kinks, ranges, outputs, variables, np.int64(0), Q, dq, 1.0, np.int64(0),
-            cut, product, offset, start, degree,
-        )  # fmt: skip
-        coefficient_norms(Q, dq, nQ, start)
-        bad, A, local = remainders(
-            ops, const, const_rad, kinks, ranges, Q, dq, nQ, RQ, np.int64(0), cut, pairs, product, offset, start, degree
-        )
-        if not wants_another_try(ops, kinks, ranges):
+        solve_in_time(program, space, np.int64(0), 1.0, cut, table)
+        coefficient_norms(space, start)
+        bad, A, local = remainders(program, space, cut, table)
+        if not wants_another_try(program.ops, space):
             break
-    tighten(ops, const, const_rad, kinks, outputs, Q, RQ, A, local)
+    tighten(program, outputs, space, A, local)
     out = np.zeros((count, p.shape[1]))
     size = np.zeros(count)
     for i in range(count):

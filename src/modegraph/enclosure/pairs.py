@@ -1,11 +1,11 @@
 """Inequalities in the references of two modes, decided pair by pair (numba).
 
 At instant k what the source reaches is y = rows m_k(p) - rows c(p') and a spread, per part of its starts.
-A *table* holds the instants of all parts: ``part_flows`` (P + 1,) first flow of each part; ``lo, hi`` (P, k)
-for which references a part has starts; per flow ``middle, scale`` (F, k) of its scaled parameters, ``flow_terms``
-(F + 1,) first row of ``exponents`` (M, k), ``flow_instants`` (F + 1,), ``flow_coefficients`` (F + 1,) first of
-``coefficients``, stored instant by instant, row by row; ``farthest`` (F,) bounds |m| + spread; per instant ``size``
-(T, f) of rounded terms and ``spread`` (T, f), or (T, 1) for a round target.
+The *table* (``arguments.Instants``) holds the instants of all parts: ``part_flows`` (P + 1,) first flow of each part;
+``lo, hi`` (P, k) for which references a part has starts; per flow ``middle, scale`` (F, k) of its scaled parameters,
+``flow_terms`` (F + 1,) first row of ``exponents`` (M, k), ``flow_instants`` (F + 1,), ``flow_coefficients`` (F + 1,)
+first of ``coefficients``, stored instant by instant, row by row; ``farthest`` (F,) bounds |m| + spread; per instant
+``size`` (T, f) of rounded terms and ``spread`` (T, f), or (T, 1) for a round target.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ ROUNDED = 1e-12
 
 
 @njit(**KERNEL)
-def _powers(p, b, flow, middle, scale, flow_terms, exponents, out):
+def _powers(p, b, flow, table, out):
     """Values of a flow's monomials of the scaled parameters (p - middle) / scale; returns how many."""
+    middle, scale, flow_terms, exponents = table.middle, table.scale, table.flow_terms, table.exponents
     first = flow_terms[flow]
     count = flow_terms[flow + 1] - first
     for m in range(count):
@@ -35,8 +36,9 @@ def _powers(p, b, flow, middle, scale, flow_terms, exponents, out):
 
 
 @njit(**KERNEL)
-def _gauge(k, b, first, coefficients, terms, powers, shift, size, spread, fixed, limits, is_round, grow, enough):
+def _gauge(k, b, first, terms, powers, shift, fixed, limits, rows, table, enough):
     """Upper bound of the gauge of pair b at instant k; infinite where it is above ``enough``."""
+    coefficients, size, spread, is_round = table.coefficients, table.size, table.spread, rows.is_round
     count = shift.size
     total = 0.0
     worst = -np.inf
@@ -63,13 +65,14 @@ def _gauge(k, b, first, coefficients, terms, powers, shift, size, spread, fixed,
             return np.inf
         worst = max(worst, gauge)
     if is_round:
-        worst = (np.sqrt(total) * grow * (1.0 + ROUNDED) + spread[k, 0] / room) * (1.0 + ROUNDED)
+        worst = (np.sqrt(total) * rows.grow * (1.0 + ROUNDED) + spread[k, 0] / room) * (1.0 + ROUNDED)
     return worst if worst <= enough else np.inf
 
 
 @njit(**KERNEL)
-def _shifts(b, rows, centre, radius, shift, fixed):
+def _shifts(b, rows, targets, shift, fixed):
     """rows c of pair b and what it may be off by; returns the largest |c|."""
+    centre, radius = targets.centre, targets.radius
     largest = 0.0
     for v in range(centre.shape[1]):
         largest = max(largest, abs(centre[b, v]))
@@ -115,50 +118,43 @@ def affine_centres(p, c0, C, off, limit):
 
 
 @njit(**KERNEL)
-def first_crossings(
-    source, target, classes, centre, radius, limits, rows, slack, is_round, grow,
-    part_flows, lo, hi, middle, scale, flow_terms, exponents, flow_instants, flow_coefficients, coefficients,
-    farthest, size, spread, quick,
-):  # fmt: skip
+def first_crossings(source, target, classes, targets, rows, table, quick):
     """For pairs (B,): the gauge of the worst part at its best instant, and the last of the first instants
     that prove a part (row of ``size``; -1 where some part has none).
 
-    source (B, k), target (B, k'), each inside its class of ``classes``, lo and hi (1, k), or nothing is proved;
-    centre, radius (B, n) and limits (B, f or 1) of the targets. With ``quick`` the gauge
-    is only known to be at most 1 or not: parts behind the first failure and instants behind the first proof
-    are not looked at.
+    source (B, k), target (B, k'), each inside its class of ``classes``, lo and hi (1, k), or nothing is proved.
+    With ``quick`` the gauge is only known to be at most 1 or not: parts behind the first failure and instants behind
+    the first proof are not looked at.
     """
+    part_flows, flow_instants = table.part_flows, table.flow_instants
     B = source.shape[0]
     gauge = np.full(B, np.inf)
     instant = np.full((B, part_flows.size - 1), -1)
-    shift = np.empty(rows.shape[0])
-    base = np.empty(rows.shape[0])
-    fixed = np.empty(rows.shape[0])
-    powers = np.empty(exponents.shape[0] + 1)
+    shift = np.empty(rows.rows.shape[0])
+    base = np.empty(rows.rows.shape[0])
+    fixed = np.empty(rows.rows.shape[0])
+    powers = np.empty(table.exponents.shape[0] + 1)
     for b in range(B):
         if not (_within(source, b, *classes[0], 0) and _within(target, b, *classes[1], 0)):
             continue
-        largest = _shifts(b, rows, centre, radius, shift, base)
+        largest = _shifts(b, rows.rows, targets, shift, base)
         met = False
         worst = -np.inf
         for part in range(part_flows.size - 1):
-            if not _within(source, b, lo, hi, part):
+            if not _within(source, b, table.lo, table.hi, part):
                 instant[b, part] = -2
                 continue
             met = True
             best = np.inf
             found = -1
             for flow in range(part_flows[part], part_flows[part + 1]):
-                terms = _powers(source, b, flow, middle, scale, flow_terms, exponents, powers)
+                terms = _powers(source, b, flow, table, powers)
                 for f in range(fixed.size):
-                    fixed[f] = base[f] + (farthest[flow] + largest) * slack[f]
-                first = flow_coefficients[flow]
+                    fixed[f] = base[f] + (table.farthest[flow] + largest) * rows.slack[f]
+                first = table.flow_coefficients[flow]
                 for k in range(flow_instants[flow], flow_instants[flow + 1]):
                     enough = 1.0 if quick else max(1.0, best)
-                    value = _gauge(
-                        k, b, first, coefficients, terms, powers, shift, size, spread, fixed, limits, is_round, grow,
-                        enough,
-                    )  # fmt: skip
+                    value = _gauge(k, b, first, terms, powers, shift, fixed, targets.limits, rows, table, enough)
                     first += terms * fixed.size
                     if value < best:
                         best = value
@@ -179,29 +175,26 @@ def first_crossings(
 
 
 @njit(**KERNEL)
-def part_gauges(
-    part, source, centre, radius, limits, rows, slack, is_round, grow,
-    part_flows, lo, hi, middle, scale, flow_terms, exponents, flow_instants, flow_coefficients, coefficients,
-    farthest, size, spread,
-):  # fmt: skip
+def part_gauges(part, source, targets, rows, table):
     """The gauges (B, K) of one part at all its instants."""
+    part_flows, flow_instants = table.part_flows, table.flow_instants
     B = source.shape[0]
     begin = flow_instants[part_flows[part]]
     out = np.empty((B, flow_instants[part_flows[part + 1]] - begin))
-    shift = np.empty(rows.shape[0])
-    base = np.empty(rows.shape[0])
-    fixed = np.empty(rows.shape[0])
-    powers = np.empty(exponents.shape[0] + 1)
+    shift = np.empty(rows.rows.shape[0])
+    base = np.empty(rows.rows.shape[0])
+    fixed = np.empty(rows.rows.shape[0])
+    powers = np.empty(table.exponents.shape[0] + 1)
     for b in range(B):
-        largest = _shifts(b, rows, centre, radius, shift, base)
+        largest = _shifts(b, rows.rows, targets, shift, base)
         for flow in range(part_flows[part], part_flows[part + 1]):
-            terms = _powers(source, b, flow, middle, scale, flow_terms, exponents, powers)
+            terms = _powers(source, b, flow, table, powers)
             for f in range(fixed.size):
-                fixed[f] = base[f] + (farthest[flow] + largest) * slack[f]
-            first = flow_coefficients[flow]
+                fixed[f] = base[f] + (table.farthest[flow] + largest) * rows.slack[f]
+            first = table.flow_coefficients[flow]
             for k in range(flow_instants[flow], flow_instants[flow + 1]):
                 out[b, k - begin] = _gauge(
-                    k, b, first, coefficients, terms, powers, shift, size, spread, fixed, limits, is_round, grow, np.inf
+                    k, b, first, terms, powers, shift, fixed, targets.limits, rows, table, np.inf
                 )
                 first += terms * fixed.size
     return out

@@ -17,35 +17,35 @@ SHORT = {**KERNEL, "nogil": False}
 
 
 @njit(inline="always", **KERNEL)
-def _accumulate(c, a, da, b, db, dmax, factor, product, offset, start, degree):
+def _accumulate(c, a, da, b, db, dmax, factor, table):
     if da > dmax:
         da = dmax
     # Unsigned indices: signed ones are checked for counting from the end (a quarter of the time).
-    for i in range(np.uint64(start[da + 1])):
+    for i in range(np.uint64(table.start[da + 1])):
         x = a[i]
         if x != 0.0:
             x *= factor
-            d = dmax - degree[i]
+            d = dmax - table.degree[i]
             if db < d:
                 d = db
-            o = np.uint64(offset[i])
-            for j in range(np.uint64(start[d + 1])):
-                c[product[o + j]] += x * b[j]
+            o = np.uint64(table.offset[i])
+            for j in range(np.uint64(table.start[d + 1])):
+                c[table.product[o + j]] += x * b[j]
 
 
 @njit(**KERNEL)
-def multiply_into(c, a, da, b, db, dmax, factor, product, offset, start, degree):
+def multiply_into(c, a, da, b, db, dmax, factor, table):
     """c += factor a b, truncated at degree dmax; da, db are the degrees of a and b."""
     if da < 0 or db < 0:
         return
     if da <= db:
-        _accumulate(c, a, da, b, db, dmax, factor, product, offset, start, degree)
+        _accumulate(c, a, da, b, db, dmax, factor, table)
     else:
-        _accumulate(c, b, db, a, da, dmax, factor, product, offset, start, degree)
+        _accumulate(c, b, db, a, da, dmax, factor, table)
 
 
 @njit(**KERNEL)
-def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
+def compose_into(c, u, du, series, dmax, work, table):
     """c = sum_k series[k] u**k by Horner, truncated at degree dmax; u has no constant term.
 
     Returns the degree of c.
@@ -54,13 +54,14 @@ def compose_into(c, u, du, series, dmax, work, product, offset, start, degree):
         c[:] = 0.0
         c[0] = series[0]
         return 0
+    start = table.start
     c[:] = 0.0
     c[0] = series[dmax]
     dc = np.int64(0)
     for k in range(dmax - 1, -1, -1):
         for i in range(start[dmax + 1]):
             work[i] = 0.0
-        multiply_into(work, c, dc, u, du, dmax, 1.0, product, offset, start, degree)
+        multiply_into(work, c, dc, u, du, dmax, 1.0, table)
         dc = min(dmax, dc + du)
         for i in range(start[dc + 1]):
             c[i] = work[i]

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+from modegraph.enclosure.arguments import Scratch
 from modegraph.enclosure.elementary import taylor_coefficients, taylor_errors
 from modegraph.enclosure.jets import PLAIN, TOO_WIDE
 from modegraph.enclosure.polynomial import KERNEL, multiply_into
@@ -39,8 +40,9 @@ from modegraph.expression.ops import (
 
 
 @njit(**KERNEL)
-def coefficient_norms(P, dg, norms, start):
+def coefficient_norms(space, start):
     """norms[q, j, d] >= sum of |coefficients| of degree d of P[q, j]."""
+    P, dg, norms = space.P, space.dg, space.norms
     norms[:] = 0.0
     for q in range(P.shape[0]):
         for j in range(P.shape[1]):
@@ -52,7 +54,7 @@ def coefficient_norms(P, dg, norms, start):
 
 
 @njit(**KERNEL)
-def truncated_part(na, tb, ta, K, cut, in_time):
+def truncated_part(na, tb, ta, cut, in_time):
     """L1 norm of what a product drops: powers of time above K, degrees above cut.
 
     (Callers pass constants as np.int64: a literal would be compiled as a version of its own.)
@@ -61,6 +63,7 @@ def truncated_part(na, tb, ta, K, cut, in_time):
     the product a' b integrated over the step: weight i / (i + j).
     """
     n = na.shape[1] - 1
+    K = cut.size - 1
     r = 0.0
     for i in range(K + 1):
         if ta[i, 0] == 0.0 or (in_time and i == 0):
@@ -83,12 +86,13 @@ def truncated_part(na, tb, ta, K, cut, in_time):
 
 
 @njit(**KERNEL)
-def composition_error(op, x, u, dmax, pairs, series, size, error, power, next_power):
+def composition_error(op, x, u, dmax, pairs, scratch):
     """L1 error of the stored composition f(x + u(xi)) at the start of the step.
 
     u[d] are the norms of the argument by degree (u[0] is ignored). Uses the one-dimensional majorant
     U(y) = sum_d u[d] y^d: what truncation at dmax drops from u^k is U(1)^k minus the kept part.
     """
+    series, size, error, power, next_power = scratch
     r = 0.0
     for d in range(1, u.size):
         r += u[d]
@@ -123,7 +127,7 @@ def composition_error(op, x, u, dmax, pairs, series, size, error, power, next_po
 
 
 @njit(**KERNEL)
-def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start, degree):
+def remainders(program, space, cut, table):
     """Fill R[q] for every node that is not a variable; R of the variables is given.
 
     Also fills ranges[q] with the range of the argument of relu, step and where nodes. A node that
@@ -131,6 +135,9 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
     its stored polynomial, and ``local``: what R would be for arguments equal to theirs (R itself for
     logarithms, arc tangents and kinks).
     """
+    ops, const, const_rad, _, _ = program
+    P, dg, norms, R, kinks, ranges = space
+    K = cut.size - 1
     nodes = ops.shape[0]
     n = norms.shape[2] - 1
     bad = -1
@@ -138,12 +145,8 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
     A = np.zeros(nodes)
     local = np.zeros(nodes)
     work = np.zeros(P.shape[2])
-    series = np.zeros(n + 2)
-    size = np.zeros(n + 2)
-    error = np.zeros(n + 2)
-    power = np.zeros(n + 2)
-    next_power = np.zeros(n + 2)
-    gamma = 1.01 * (pairs * (K + 1) + 8) * UNIT
+    scratch = Scratch(np.zeros(n + 2), np.zeros(n + 2), np.zeros(n + 2), np.zeros(n + 2), np.zeros(n + 2))
+    gamma = 1.01 * (table.pairs * (K + 1) + 8) * UNIT
     for q in range(nodes):
         total = 0.0
         for j in range(K + 1):
@@ -194,23 +197,21 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             own = f * r + spread + 2.0 * UNIT * rounded
             R[q] = (f * R[a] + own) * UP + TINY
         elif op == MUL:
-            own = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[b]
+            own = truncated_part(norms[a], tails[b], tails[a], cut, np.int64(0)) + gamma * A[a] * A[b]
             R[q] = (A[a] * R[b] + R[a] * A[b] + R[a] * R[b] + own) * UP + TINY
         elif op == SQR:
-            own = truncated_part(norms[a], tails[a], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[a]
+            own = truncated_part(norms[a], tails[a], tails[a], cut, np.int64(0)) + gamma * A[a] * A[a]
             R[q] = (2.0 * A[a] * R[a] + R[a] * R[a] + own) * UP + TINY
         elif op == SIN:
             # E = stored - true obeys E_s' = E_c a' + d1, E_c' = -E_s a' + d2: a rotation, so
             # |E|_2 <= |E(0)|_2 + int |d|_2 <= |E(0)|_2 + D1 + D2.
-            es = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
-            ec = composition_error(
-                np.int64(COS), P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power
-            )
+            es = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], table.pairs, scratch)
+            ec = composition_error(np.int64(COS), P[a, 0, 0], norms[a, 0], cut[0], table.pairs, scratch)
             speed = 0.0
             for j in range(1, K + 1):
                 speed += j * tails[a, j, 0]
-            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(1)) + gamma * speed * A[b]
-            d2 = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(1)) + gamma * speed * A[q]
+            d1 = truncated_part(norms[a], tails[b], tails[a], cut, np.int64(1)) + gamma * speed * A[b]
+            d2 = truncated_part(norms[a], tails[q], tails[a], cut, np.int64(1)) + gamma * speed * A[q]
             own = math.sqrt(es * es + ec * ec) + d1 + d2
             R[q] = (own + R[a]) * UP + TINY
             R[b] = R[q]
@@ -223,8 +224,8 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             for j in range(1, K + 1):
                 speed += j * tails[a, j, 0]
                 travel += tails[a, j, 0]
-            e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
-            d1 = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(1)) + gamma * speed * A[q]
+            e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], table.pairs, scratch)
+            d1 = truncated_part(norms[a], tails[q], tails[a], cut, np.int64(1)) + gamma * speed * A[q]
             # E' = E a' + d: |E(s)| <= (|E(0)| + D) exp(a(s) - a(tau)).
             own = (e0 + d1) * math.exp(travel * UP) * UP
             top = P[a, 0, 0] + (A[a] - norms[a, 0, 0] * (1.0 - 2.0 * (UP - 1.0)))
@@ -236,8 +237,8 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
             for j in range(1, K + 1):
                 travel += tails[a, j, 0]
                 speed += j * tails[a, j, 0]
-            e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], pairs, series, size, error, power, next_power)
-            d1 = truncated_part(norms[a], tails[b], tails[a], K, cut, np.int64(1)) + gamma * speed * A[b]
+            e0 = composition_error(op, P[a, 0, 0], norms[a, 0], cut[0], table.pairs, scratch)
+            d1 = truncated_part(norms[a], tails[b], tails[a], cut, np.int64(1)) + gamma * speed * A[b]
             # E' = (stored g - g) a' + d with g = 1/a or 1/(1 + a^2), whose remainder is R[b].
             lip = R[a] if op == ATAN else R[a] * (A[b] + R[b])
             R[q] = (e0 + d1 + R[b] * travel + lip) * UP + TINY
@@ -245,13 +246,13 @@ def remainders(ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pa
                 R[q] = np.inf
         elif op == RECIP:
             # rho = |a r - 1| formed explicitly; r - 1/alpha = (a r - 1 + r (alpha - a)) / alpha.
-            rho = truncated_part(norms[a], tails[q], tails[a], K, cut, np.int64(0)) + gamma * A[a] * A[q]
+            rho = truncated_part(norms[a], tails[q], tails[a], cut, np.int64(0)) + gamma * A[a] * A[q]
             for j in range(K + 1):
                 work[:] = 0.0
                 for i in range(j + 1):
                     multiply_into(
                         work, P[a, i], dg[a, i], P[q, j - i], dg[q, j - i], cut[j], 1.0,
-                        product, offset, start, degree,
+                        table,
                     )  # fmt: skip
                 if j == 0:
                     work[0] -= 1.0
@@ -370,9 +371,10 @@ def image(op, lo, hi):
 
 
 @njit(**KERNEL)
-def wants_another_try(ops, kinks, ranges):
+def wants_another_try(ops, space):
     """Whether a kink is crossed, or a function ranges too widely: then its range is known now, and the
     stored polynomials can be chosen better."""
+    kinks, ranges = space.kinks, space.ranges
     for q in range(ops.shape[0]):
         op = ops[q, 0]
         if (op in (RELU, STEP)) and ranges[q, 0] < 0.0 < ranges[q, 1]:

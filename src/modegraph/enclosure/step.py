@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from modegraph.enclosure.adjoint import tighten
+from modegraph.enclosure.arguments import Jacobian
 from modegraph.enclosure.disturbance import DROPPED, disturbance_bounds, disturbance_columns
 from modegraph.enclosure.exponential import push_columns
 from modegraph.enclosure.jets import solve_in_time
@@ -38,8 +39,9 @@ NO_CONTRACTION = 4
 
 
 @njit(**KERNEL)
-def set_variable(P, dg, v, coefficients, degree):
+def set_variable(space, v, coefficients, degree):
     """Coefficient 0 of variable node v; the others zero."""
+    P, dg = space.P, space.dg
     top = -1
     P[v] = 0.0
     dg[v, :] = -1
@@ -51,17 +53,16 @@ def set_variable(P, dg, v, coefficients, degree):
 
 
 @njit(**KERNEL)
-def taylor_step(
-    ops, const, const_rad, outputs, variables, states, p, time_index, h, K, cut, pairs,
-    P, dg, norms, R, kinks, ranges, product, offset, start, degree,
-):  # fmt: skip
+def taylor_step(program, n, p, time_index, h, cut, space, table):
     """Taylor polynomial of the centre dynamics over the step and its integrated defect.
 
     Returns (defect (n,), time part of the defect (n,), first undefined node or -1).
     """
-    n = states
+    ops, outputs, variables, start = program.ops, program.outputs, program.variables, table.start
+    P, dg, _, R, _, ranges = space
+    K = cut.size - 1
     for v in range(variables.size):
-        set_variable(P, dg, variables[v], p[v], degree)
+        set_variable(space, variables[v], p[v], table.degree)
     if time_index >= 0:
         P[variables[time_index], 1, 0] = h
         dg[variables[time_index], 1] = 0
@@ -71,18 +72,13 @@ def taylor_step(
     bad = -1
     A = local = R
     for _attempt in range(2):
-        solve_in_time(
-            ops, const, kinks, ranges, outputs, variables, n, P, dg, h, K, cut, product, offset, start, degree
-        )
-        coefficient_norms(P, dg, norms, start)
+        solve_in_time(program, space, n, h, cut, table)
+        coefficient_norms(space, start)
         R[:] = 0.0
-        bad, A, local = remainders(
-            ops, const, const_rad, kinks, ranges, P, dg, norms, R, K, cut, pairs, product, offset, start,
-            degree,
-        )  # fmt: skip
-        if not wants_another_try(ops, kinks, ranges):
+        bad, A, local = remainders(program, space, cut, table)
+        if not wants_another_try(ops, space):
             break
-    tighten(ops, const, const_rad, kinks, outputs, P, R, A, local)
+    tighten(program, outputs, space, A, local)
     defect = np.zeros(n)
     in_time = np.zeros(n)
     for i in range(n):
@@ -103,11 +99,13 @@ def taylor_step(
 
 
 @njit(**KERNEL)
-def truncate_inputs(P, dg, norms, variables, Q, dq, inputs, KQ, q, embed, start, lost):
-    """Copy the variables of one tape to another, cut to degrees q and KQ; lost[v]: what is dropped.
+def truncate_inputs(source, variables, target, inputs, KQ, q, embed, start, lost):
+    """Copy the variables of one program to another's ``inputs``, cut to degrees q and KQ; lost[v]: what is dropped.
 
-    Monomial k of P's table is monomial embed[k] of Q's; degrees are the same in both.
+    Monomial k of the source's table is monomial embed[k] of the target's; degrees are the same in both.
     """
+    P, dg, norms = source.P, source.dg, source.norms
+    Q, dq = target.P, target.dg
     n = norms.shape[2] - 1
     for v in range(variables.size):
         a = variables[v]
@@ -127,16 +125,18 @@ def truncate_inputs(P, dg, norms, variables, Q, dq, inputs, KQ, q, embed, start,
 
 
 @njit(**KERNEL)
-def split_output(Q, o, KJ, q, embed, owner, errors, start, J, dJ, nJ, swing, hessian):
-    """Split an output of the Jacobian tape: its polynomial J (KJ+1, Nq) in the set variables with
-    degrees dJ and norms nJ, and how far it swings with each error variable, swing (n,), of which
-    hessian (n,) is the constant coefficient with its sign. Returns the norm of what was dropped.
+def split_output(Q, o, r, q, errors, start, jacobian, swing, hessian):
+    """Split output o of the Jacobian's program: entry r of ``jacobian`` in the set variables, and how far it swings
+    with each error variable, swing (n,), of which hessian (n,) is the constant coefficient with its sign. Returns the
+    norm of what was dropped.
     """
+    embed, owner, variables = errors
+    J, dJ, nJ = jacobian.J[r], jacobian.dJ[r], jacobian.nJ[r]
     swing[:] = 0.0
     for v in range(swing.size):
-        hessian[v] = Q[o, 0, errors[v]]
+        hessian[v] = Q[o, 0, variables[v]]
     dropped = 0.0
-    for i in range(KJ + 1):
+    for i in range(J.shape[0]):
         for k in range(owner.size):
             if owner[k] >= 0:
                 swing[owner[k]] += abs(Q[o, i, k])
@@ -157,43 +157,34 @@ def split_output(Q, o, KJ, q, embed, owner, errors, start, J, dJ, nJ, swing, hes
 
 
 @njit(**KERNEL)
-def flow_step(
-    ops, const, const_rad, outputs, variables,
-    jops, jconst, jconst_rad, joutputs, jvariables,
-    states, p, G, radius, full_w, first_w, time_index, h, K, cut, KJ, q, KP, pairs, most, ebox0, ybox0, room,
-    P, dg, norms, R, kinks, ranges, Q, dq, nQ, RQ, jkinks, jranges,
-    product, offset, start, degree,
-    jproduct, joffset, jstart, jdegree, jpairs, jcut, embed, owner, errors,
-):  # fmt: skip
-    """One step. Variables of both tapes: states, then time, disturbance, unknowns, all in p.
+def flow_step(rates, slopes, initial, settings, guess, space, jspace, table, jtable, errors):
+    """One step. Variables of both programs: states, then time, disturbance, unknowns, all in ``initial.p``.
 
-    The tape of f works over the table of the set variables. The tape of the Jacobian works over a
-    second table with one more variable for the error of each state (``errors``: their monomials);
-    embed[k] is monomial k of the first table in the second.
-
-    ``radius`` (nw,) half-widths of the disturbance around the centre held in p; ``full_w``: df/dx and
-    df/dw depend on w, evaluate them for all w; ``first_w``: index of variable w[0]. G (ng, n, Nq), at
-    most ``most`` of them: others are merged.
+    ``rates`` is the program of f, over the table of the set variables and in ``space``. ``slopes`` is that of the
+    Jacobian, in ``jspace`` over ``jtable``, which has one more variable for the error of each state (``errors``).
 
     Returns (status, node, p_end (n, N), G_end, tube (n,), bend (n,), rest (n,), control (5,)) where
     tube bounds e over the whole step, bend the distance of p(s) from the chord p(0)..p(1), rest what
-    neither Psi e(0) nor the disturbance's columns carry (ybox0, ebox0: guesses of rest and tube, that at
-    least ``room`` times what e is at the start), and
+    neither Psi e(0) nor the disturbance's columns carry, and
     control = (time defect, other defect, spectral radius of h M, of h A0, share of e in what feeds e)
     for the step control.
     """
-    n = states
-    Nq = G.shape[2]
+    P, norms, variables = space.P, space.norms, rates.variables
+    Q, dq, RQ = jspace.P, jspace.dg, jspace.R
+    joutputs, jvariables = slopes.outputs, slopes.variables
+    p, G, radius, full_w, first_w, time_index = initial
+    h, cut, jcut, q, KP, most = settings
+    start = table.start
+    K = cut.size - 1
+    KJ = jcut.size - 1
+    _, n, Nq = G.shape
     N = P.shape[2]
     nw = radius.size
     nothing_p = np.zeros((n, N))
     nothing = np.zeros(n)
     control = np.zeros(5)
     control[0] = np.inf
-    defect, in_time, bad = taylor_step(
-        ops, const, const_rad, outputs, variables, n, p, time_index, h, K, cut, pairs,
-        P, dg, norms, R, kinks, ranges, product, offset, start, degree,
-    )  # fmt: skip
+    defect, in_time, bad = taylor_step(rates, n, p, time_index, h, cut, space, table)
     for i in range(n):
         if not defect[i] < np.inf:
             return UNDEFINED, max(bad, 0), nothing_p, G, nothing, nothing, defect, control
@@ -208,6 +199,7 @@ def flow_step(
     J = np.zeros((n * n, KJ + 1, Nq))
     dJ = np.zeros((n * n, KJ + 1), np.int64)
     nJ = np.zeros((n * n, KJ + 1, q + 1))
+    jacobian = Jacobian(J, dJ, nJ)
     A0 = np.zeros((n, n))
     RJ = np.zeros(n * n)
     fixed = np.zeros(n * n)
@@ -220,8 +212,8 @@ def flow_step(
     ybox = np.zeros(n)
     ebox = np.zeros(n)
     for i in range(n):
-        ybox[i] = max(ybox0[i], 3.0 * defect[i]) + TINY
-        ebox[i] = max(ebox0[i], room * (z[i] + 2.0 * defect[i])) + TINY
+        ybox[i] = max(guess.rest[i], 3.0 * defect[i]) + TINY
+        ebox[i] = max(guess.tube[i], guess.room * (z[i] + 2.0 * defect[i])) + TINY
     need = ebox
     g = nothing
     u = nothing
@@ -238,46 +230,37 @@ def flow_step(
     rest = nothing
     accepted = False
     for _attempt in range(8):
-        truncate_inputs(P, dg, norms, variables, Q, dq, jvariables, KJ, q, embed, start, lost)
+        truncate_inputs(space, variables, jspace, jvariables, KJ, q, errors.embed, start, lost)
         for v in range(variables.size):
             RQ[jvariables[v]] = lost[v]
         for i in range(n):
-            Q[jvariables[i], 0, errors[i]] = ebox[i]
-            dq[jvariables[i], 0] = max(dq[jvariables[i], 0], jdegree[errors[i]])
+            k = errors.variables[i]
+            Q[jvariables[i], 0, k] = ebox[i]
+            dq[jvariables[i], 0] = max(dq[jvariables[i], 0], jtable.degree[k])
         if full_w:
             for j in range(nw):
                 RQ[jvariables[first_w + j]] = radius[j]
-        jranges[:] = np.nan
-        solve_in_time(
-            jops, jconst, jkinks, jranges, joutputs, jvariables, np.int64(0), Q, dq, h, KJ, jcut, jproduct, joffset,
-            jstart, jdegree,
-        )  # fmt: skip
-        coefficient_norms(Q, dq, nQ, jstart)
-        bad, A, local = remainders(
-            jops, jconst, jconst_rad, jkinks, jranges, Q, dq, nQ, RQ, KJ, jcut, jpairs, jproduct, joffset,
-            jstart, jdegree,
-        )  # fmt: skip
-        tighten(jops, jconst, jconst_rad, jkinks, joutputs[: n * (n + nw)], Q, RQ, A, local)
+        jspace.ranges[:] = np.nan
+        solve_in_time(slopes, jspace, np.int64(0), h, jcut, jtable)
+        coefficient_norms(jspace, jtable.start)
+        bad, A, local = remainders(slopes, jspace, jcut, jtable)
+        tighten(slopes, joutputs[: n * (n + nw)], jspace, A, local)
         for o in joutputs:
             if not RQ[o] < np.inf:
                 return JACOBIAN_UNDEFINED, bad, nothing_p, G, ebox, nothing, defect, control
         for r in range(n * n):
             o = joutputs[r]
-            fixed[r] = RQ[o] + split_output(
-                Q, o, KJ, q, embed, owner, errors, start, J[r], dJ[r], nJ[r], swing[r], hessian[r]
-            )
+            fixed[r] = RQ[o] + split_output(Q, o, r, q, errors, start, jacobian, swing[r], hessian[r])
             A0[r // n, r % n] = J[r, 0, 0]
         X = h * A0
         W, _ = exponential_majorant(X)
         control[3] = spectral_radius(X)
-        F, sup, last, curve, tails = fundamental_matrix(J, dJ, n, h, KJ, KP, q, product, offset, start, degree)
-        B, miss_b = disturbance_bounds(Q, RQ, joutputs, n * n, n, radius, KJ, embed, owner)
-        columns, outside, u = disturbance_columns(
-            J, dJ, nJ, B, radius, h, q, pairs, product, offset, start, degree
-        )  # fmt: skip
+        F, sup, last, curve, tails = fundamental_matrix(jacobian, n, h, KP, q, table)
+        B, miss_b = disturbance_bounds(Q, RQ, joutputs, n * n, n, radius, errors)
+        columns, outside, u = disturbance_columns(jacobian, B, radius, h, q, table)
         if nw > 0:
-            chords, strays, tops = push_columns(J, dJ, nJ, n, h, q, pairs, product, offset, start, degree)
-        H_end, dropped = advance_generators(F, G, q, pairs, product, offset, start, degree)
+            chords, strays, tops = push_columns(jacobian, n, h, q, table)
+        H_end, dropped = advance_generators(F, G, q, table)
         for i in range(n):
             for k in range(n):
                 for l in range(n):
@@ -312,7 +295,7 @@ def flow_step(
                         if keep_push:
                             s -= abs(hessian[r, v]) * shrink[v] * (1.0 - 2.0 * (UP - 1.0))
                     RJ[r] = (fixed[r] + 0.5 * max(0.0, s)) * UP + 4.0 * UNIT * abs(A0[i, k])
-            E = fundamental_defect(nJ, RJ, sup, tails, n, h, KJ, KP, q, pairs)
+            E = fundamental_defect(nJ, RJ, sup, tails, n, h, KP, q, table.pairs)
             D = np.zeros((n, n))
             M = np.zeros((n, n))
             for r in range(n):

@@ -16,13 +16,16 @@ from modegraph.enclosure.rounding import TINY, UNIT, UP
 
 
 @njit(**KERNEL)
-def fundamental_matrix(J, dJ, n, h, KJ, KP, q, product, offset, start, degree):
+def fundamental_matrix(jacobian, n, h, KP, q, table):
     """Psi' = h J Psi, Psi(0) = I, truncated at degree KP in time and q in the set variables.
 
-    J (n*n, KJ+1, Nq) with degrees dJ. Returns Psi(1) (n, n, Nq), entrywise sup |Psi|, its sup at the
+    Returns Psi(1) (n, n, Nq), entrywise sup |Psi|, its sup at the
     end, its distance from the chord between the ends, and the tail norms (KP+1, n, n, q+2) of its
     coefficients by degree.
     """
+    J, dJ, _ = jacobian
+    start = table.start
+    KJ = J.shape[1] - 1
     Nq = J.shape[2]
     S = np.zeros((KP + 1, n, n, Nq))
     dS = np.full((KP + 1, n, n), -1, np.int64)
@@ -40,7 +43,7 @@ def fundamental_matrix(J, dJ, n, h, KJ, KP, q, product, offset, start, degree):
                         if da >= 0 and db >= 0:
                             multiply_into(
                                 S[j + 1, r, c], J[r * n + k, i], da, S[j - i, k, c], db, q, h / (j + 1),
-                                product, offset, start, degree,
+                                table,
                             )  # fmt: skip
                             top = max(top, min(q, da + db))
                 dS[j + 1, r, c] = top
@@ -81,11 +84,12 @@ def chord_distance(j):
 
 
 @njit(**KERNEL)
-def fundamental_defect(nJ, RJ, sup, tails, n, h, KJ, KP, q, pairs):
+def fundamental_defect(nJ, RJ, sup, tails, n, h, KP, q, pairs):
     """E >= int |h J Psi - Psi'| entrywise, for every J within RJ of its polynomial.
 
     nJ (n*n, KJ+1, q+1) are the norms of J by degree, upward.
     """
+    KJ = nJ.shape[1] - 1
     E = np.zeros((n, n))
     gamma = 1.01 * (n * (KJ + 1) * pairs + 8) * UNIT
     # Psi(1) is a sum of KP + 1 coefficients: at most KP roundings.
@@ -240,11 +244,13 @@ def spectral_radius(A):
 
 
 @njit(**KERNEL)
-def apply_matrix(J, dJ, vector, n, q, factor, product, offset, start, degree):
+def apply_matrix(jacobian, vector, n, q, factor, table):
     """factor J_0(xi) v(xi) truncated at degree q, and the norms (n,) of what that drops.
 
-    J (n*n, KJ+1, Nq) as in ``fundamental_matrix``, of which coefficient 0 in time is used; v (n, Nq).
+    Of J coefficient 0 in time is used; v (n, Nq).
     """
+    J, dJ, _ = jacobian
+    start = table.start
     Nq = vector.shape[1]
     out = np.zeros((n, Nq))
     lost = np.zeros(n)
@@ -262,7 +268,7 @@ def apply_matrix(J, dJ, vector, n, q, factor, product, offset, start, degree):
         for k in range(n):
             r = i * n + k
             if dJ[r, 0] >= 0 and top[k] >= 0:
-                multiply_into(out[i], J[r, 0], dJ[r, 0], vector[k], top[k], q, factor, product, offset, start, degree)
+                multiply_into(out[i], J[r, 0], dJ[r, 0], vector[k], top[k], q, factor, table)
                 for d in range(1, dJ[r, 0] + 1):
                     s = 0.0
                     for l in range(start[d], start[d + 1]):
@@ -278,14 +284,15 @@ LINE = 8
 
 
 @njit(**KERNEL)
-def advance_generators(F, G, q, pairs, product, offset, start, degree):
+def advance_generators(F, G, q, table):
     """F(xi) G(xi) truncated at degree q, and a box radius for what is dropped or rounded."""
+    start = table.start
     count, n, Nq = G.shape
     H = np.zeros((count, n, Nq))
     lost = np.zeros(n)
     nF = np.zeros((n, n, q + 1))
     sF = np.zeros((n, n))
-    gamma = 1.01 * (n * pairs + 4) * UNIT
+    gamma = 1.01 * (n * table.pairs + 4) * UNIT
     for r in range(n):
         for c in range(n):
             for d in range(q + 1):
@@ -322,7 +329,7 @@ def advance_generators(F, G, q, pairs, product, offset, start, degree):
                 both = 1.0 if d > c else 0.0
                 _multiply_blocks(
                     after[r], F[r, c], before[c], F[r, d], before[d], both, max(top[c], top[d]), q,
-                    product, offset, start, degree,
+                    table,
                 )  # fmt: skip
             for k0 in range(0, Nq, LINE):
                 for g in range(most):
@@ -340,20 +347,20 @@ def advance_generators(F, G, q, pairs, product, offset, start, degree):
 
 
 @njit(**KERNEL)
-def _multiply_blocks(out, a, first, b, second, both, top, q, product, offset, start, degree):
+def _multiply_blocks(out, a, first, b, second, both, top, q, table):
     """out += a first + both b second, truncated at degree q: polynomials (Nq, BLOCK) side by side, of degree ``top``.
 
     Two at once: what is added to is read and written half as often.
     """
     if top < 0:
         return
-    for i in range(start[q + 1]):
+    for i in range(table.start[q + 1]):
         x = a[i]
         y = both * b[i]
         if x != 0.0 or y != 0.0:
-            o = offset[i]
-            for j in range(start[min(top, q - degree[i]) + 1]):
-                k = product[o + j]
+            o = table.offset[i]
+            for j in range(table.start[min(top, q - table.degree[i]) + 1]):
+                k = table.product[o + j]
                 for g in range(BLOCK):
                     out[k, g] += x * first[j, g] + y * second[j, g]
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.enclosure.arguments import Workspace, program
 from modegraph.enclosure.monomials import Monomials
 from modegraph.enclosure.observe import enclose_at
 from modegraph.expression.tape import Tape
@@ -14,17 +13,17 @@ from modegraph.expression.tape import Tape
 Floats = NDArray[np.float64]
 
 
-def workspace(tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
+def workspace(tape: Tape, K: int, size: int, degree: int) -> Workspace:
     """Arrays a kernel fills for the nodes of a tape: K + 1 powers of time, ``size`` monomials."""
     rows = tape.size
-    return {
-        "P": np.zeros((rows, K + 1, size)),
-        "dg": np.full((rows, K + 1), -1, np.int64),
-        "norms": np.zeros((rows, K + 1, degree + 1)),
-        "R": np.zeros(rows),
-        "kinks": np.zeros((rows, 2)),
-        "ranges": np.full((rows, 2), np.nan),
-    }
+    return Workspace(
+        P=np.zeros((rows, K + 1, size)),
+        dg=np.full((rows, K + 1), -1, np.int64),
+        norms=np.zeros((rows, K + 1, degree + 1)),
+        R=np.zeros(rows),
+        kinks=np.zeros((rows, 2)),
+        ranges=np.full((rows, 2), np.nan),
+    )
 
 
 def evaluate_over(
@@ -36,8 +35,6 @@ def evaluate_over(
     """
     space = workspace(tape, 0, table.size, degree)
     return enclose_at(
-        tape.ops, tape.const, tape.const_rad, tape.outputs, tape.variables,
-        np.ascontiguousarray(inputs), np.ascontiguousarray(radius, float), np.array([degree], np.int64), table.pairs,
-        space["P"], space["dg"], space["norms"], space["R"], space["kinks"], space["ranges"],
-        *table.arrays,
+        program(tape), np.ascontiguousarray(inputs), np.ascontiguousarray(radius, float), np.array([degree], np.int64),
+        space, table.arrays,
     )  # fmt: skip

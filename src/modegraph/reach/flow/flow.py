@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modegraph.enclosure.arguments import Errors, Guess, Initial, Settings, Workspace, program
 from modegraph.enclosure.monomials import Monomials, monomials
 from modegraph.enclosure.observe import observe_step, observed_bounds
 from modegraph.enclosure.rounding import UNIT
@@ -124,8 +125,8 @@ class Flow:
         p, unknowns, slack = start_polynomials(piece, self.table)
         self._unknowns = unknowns
         self._errors = error_table(self.table, self.q, n)
-        self._spaces: dict[tuple[int, str], dict[str, Any]] = {}
-        self._series: dict[str, Any] = {}
+        self._spaces: dict[tuple[int, str], Workspace] = {}
+        self._series: Workspace
         self.time_degree = MOST_TIME_DEGREE
         self._cut = np.full(MOST_TIME_DEGREE + 1, order.degree, np.int64)
         if order.degree > 3:
@@ -210,7 +211,7 @@ class Flow:
 
     # -- stepping --------------------------------------------------------------------------------
 
-    def _space(self, kind: str, tape: Tape, K: int, size: int, degree: int) -> dict[str, Any]:
+    def _space(self, kind: str, tape: Tape, K: int, size: int, degree: int) -> Workspace:
         key = (self.segment, kind)
         if key not in self._spaces:
             self._spaces[key] = workspace(tape, K, size, degree)
@@ -305,7 +306,7 @@ class Flow:
         if self.segment not in self._passages:
             self._passages[self.segment] = Passages(self)
         passages = self._passages[self.segment]
-        ranges = self._series["ranges"]
+        ranges = self._series.ranges
         return passages.attempt(self, h, stop) if passages.near(ranges) else None
 
     def _rate_cap(self, fld: Field) -> float:
@@ -347,16 +348,14 @@ class Flow:
         longer = h / (self.steps[-1].end - self.steps[-1].start) if self.steps else 1.0
         guess = error_guess(self._ebox, self._ybox, self.remainder, self._growth, longer)
         return flow_step(
-            f.ops, f.const, f.const_rad, f.outputs, f.variables,
-            j.ops, j.const, j.const_rad, outputs, j.variables,
-            n, inputs, self._G, moving, fld.full_w and len(moving) > 0, fld.first_w, fld.time_index,
-            h, K, self._cut[: K + 1], KJ, self.q, FUNDAMENTAL_TIME_DEGREE,
-            self.table.pairs, most, *guess,
-            big["P"], big["dg"], big["norms"], big["R"], big["kinks"], big["ranges"],
-            jac["P"], jac["dg"], jac["norms"], jac["R"], jac["kinks"], jac["ranges"],
-            *self.table.arrays, *self._errors.table.arrays, self._errors.table.pairs,
-            np.full(KJ + 1, self._errors.table.order, np.int64), self._errors.embed, self._errors.owner,
-            self._errors.variables,
+            program(f), program(j)._replace(outputs=outputs),
+            Initial(inputs, self._G, moving, fld.full_w and len(moving) > 0, fld.first_w, fld.time_index),
+            Settings(
+                h, self._cut[: K + 1], np.full(KJ + 1, self._errors.table.order, np.int64), self.q,
+                FUNDAMENTAL_TIME_DEGREE, most,
+            ),
+            Guess(*guess), big, jac, self.table.arrays, self._errors.table.arrays,
+            Errors(self._errors.embed, self._errors.owner, self._errors.variables),
         )  # fmt: skip
 
     def _record(
@@ -413,11 +412,8 @@ class Flow:
         radius[: fld.states] = tube
         radius[fld.first_w : fld.first_d] = self.w_radius
         return observe_step(
-            big["P"], big["dg"], big["norms"], fld.rates.variables,
-            o.ops, o.const, o.const_rad, o.outputs, o.variables, radius, h, K, np.full(K + 1, q, np.int64),
-            self.table.pairs, space["P"], space["dg"], space["norms"], space["R"], space["kinks"],
-            space["ranges"], *self.table.arrays,
-        )  # fmt: skip
+            big, fld.rates.variables, program(o), radius, h, np.full(K + 1, q, np.int64), space, self.table.arrays
+        )
 
     def _fail(self, fld: Field, status: int, node: int) -> None:
         widths = self.remainder
@@ -439,7 +435,7 @@ class Flow:
         fld = self.fields[self.steps[-1].segment]
         n = fld.states
         space = self._spaces[(self.steps[-1].segment, "j")]
-        return np.asarray(space["P"][fld.jacobian.outputs[: n * n], 0, 0].reshape(n, n).copy())
+        return np.asarray(space.P[fld.jacobian.outputs[: n * n], 0, 0].reshape(n, n).copy())
 
     def wants_restart(self) -> bool:
         """Whether the remainder feeds itself and is as large as the polynomial part."""
