@@ -53,6 +53,7 @@ def test_files_do_not_import_each_other() -> None:
 
 
 TESTED_ELSEWHERE = {
+    "enclosure/arguments.py": "enclosure/test_operations.py: records that kernels take, nothing of their own",
     "enclosure/adjoint.py": "enclosure/test_jets_and_remainder.py: it tightens what jets leave",
     "enclosure/disturbance.py": "enclosure/test_exponential.py: its columns are integrals of that exponential",
     "enclosure/elementary.py": "enclosure/test_jets_and_remainder.py: series, through the nodes that use them",
