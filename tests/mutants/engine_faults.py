@@ -391,6 +391,13 @@ ENGINE_FAULTS = (
         ("tests/reach/cover/test_chain.py::test_halves_go_on_where_the_flow_began",),
     ),
     Fault(
+        "a part that is cut loses a child",
+        "reach/cover/improve.py",
+        "others = [*_without(parts, part), *children]",
+        "others = [*_without(parts, part), *children[:1]]",
+        ("tests/reach/cover/test_improve.py",),
+    ),
+    Fault(
         "halves on the way begin a flow too late",
         "reach/cover/chain.py",
         "            whole = restarted([self.flows[k - 1]], whole.fields, compact=True) or whole\n",
