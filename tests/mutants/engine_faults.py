@@ -188,6 +188,13 @@ ENGINE_FAULTS = (
         ("tests/certify/test_proof.py",),
     ),
     Fault(
+        "tails together begin with the first of them",
+        "reach/tail/base.py",
+        "max(tail.start for tail in tails)",
+        "min(tail.start for tail in tails)",
+        ("tests/reach/tail/test_base.py",),
+    ),
+    Fault(
         "an invariant set starts when its first part does",
         "certify/proof.py",
         "tail_start=max(p.tail_start for p in parts)",

@@ -30,7 +30,8 @@ from modegraph.reach.cover.degrees import CURVED, class_tail_order
 from modegraph.reach.cover.improve import improve
 from modegraph.reach.flowpipe import DEFAULT_HORIZON
 from modegraph.reach.start.piece import Chart, Piece
-from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
+from modegraph.reach.tail.base import Tail, TailFailure
+from modegraph.reach.tail.box import TailSearch
 
 MOST_PARTS = 32
 DEEPEST = 7
@@ -199,17 +200,10 @@ def _tail(compiled: CompiledMode, chains: Sequence[Chain]) -> Tail | TailFailure
         tail = search.attempt([flow])
         if isinstance(tail, TailFailure):
             return tail
-        if not (tail.face_upper <= 0.0).all():
+        if not tail.is_legal:
             return TailFailure("a constraint cannot be proved on the invariant set")
         found.append(tail)
-    return Tail(
-        max(tail.start for tail in found),
-        np.max([tail.face_upper for tail in found], axis=0),
-        np.max([tail.tracking for tail in found], axis=0),
-        np.min([tail.lo for tail in found], axis=0),
-        np.max([tail.hi for tail in found], axis=0),
-        min(tail.decay for tail in found),
-    )
+    return Tail.together(found)
 
 
 def _own_chart(piece: Piece) -> Chart:

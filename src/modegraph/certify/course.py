@@ -15,7 +15,8 @@ from modegraph.guarded import guarded, stopped
 from modegraph.reach.cover import restart
 from modegraph.reach.cover.degrees import tail_order
 from modegraph.reach.flow.flow import RESTART_FEEDBACK, Flow
-from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
+from modegraph.reach.tail.base import Tail, TailFailure
+from modegraph.reach.tail.box import TailSearch
 from modegraph.reach.tail.decay import SettledLoop
 from modegraph.reach.tail.funnel import NoFunnel
 
@@ -162,7 +163,7 @@ class Course:
             ).attempt([flow]),
             lambda error: TailFailure(stopped(error)),
         )  # fmt: skip
-        if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
+        if isinstance(outcome, Tail) and outcome.is_legal:
             self.tail, self._decay = outcome, outcome.decay
             return
         self.reason = getattr(outcome, "reason", "a constraint fails in the invariant set")

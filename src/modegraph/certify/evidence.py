@@ -14,7 +14,7 @@ from modegraph.certify.verdict import Unproved, Widths
 from modegraph.expression.evaluate import Evaluator
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.tail.box import Tail
+from modegraph.reach.tail.base import Tail
 
 Floats = NDArray[np.float64]
 

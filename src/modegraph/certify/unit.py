@@ -39,7 +39,8 @@ from modegraph.model.sets import is_subset
 from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode, compile_mode, compile_reset
 from modegraph.reach.cover.degrees import start_order, tail_order
-from modegraph.reach.tail.box import Tail, TailSearch
+from modegraph.reach.tail.base import Tail
+from modegraph.reach.tail.box import TailSearch
 
 POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""

@@ -15,7 +15,7 @@ from modegraph.certify.targets.region import Region
 from modegraph.certify.verdict import Floats
 from modegraph.deadline import Deadline
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.tail.box import Tail
+from modegraph.reach.tail.base import Tail
 from modegraph.reach.tail.decay import SettledLoop
 from modegraph.reach.tail.funnel import Funnel, FunnelBuilder, NoFunnel, NormBall
 
