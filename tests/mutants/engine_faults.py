@@ -99,6 +99,13 @@ ENGINE_FAULTS = (
         ("tests/graph/test_classes.py::test_instants_before_a_limit_fails_may_be_used",),
     ),
     Fault(
+        "a relation forgets the remainders of its flows",
+        "certify/moments.py",
+        "rest.p)) + z + 64.0 * UNIT * size)",
+        "rest.p)) + 64.0 * UNIT * size)",
+        ("tests/certify/test_moments.py",),
+    ),
+    Fault(
         "even powers get their lower bound",
         "enclosure/ranges.py",
         "        elif kinds[k] == EVEN and x > 0.0:",
@@ -475,6 +482,13 @@ ENGINE_FAULTS = (
         "t0=begin, energy=flow.spent)",
         "t0=begin, energy=0.0)",
         ("tests/reach/cover/test_chain.py::test_halves_go_on_where_the_flow_began",),
+    ),
+    Fault(
+        "a part that is cut loses a child",
+        "reach/cover/improve.py",
+        "others = [*_without(parts, part), *children]",
+        "others = [*_without(parts, part), *children[:1]]",
+        ("tests/reach/cover/test_improve.py",),
     ),
     Fault(
         "halves on the way begin a flow too late",

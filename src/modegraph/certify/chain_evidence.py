@@ -19,7 +19,7 @@ from modegraph.certify.switching.common_time import CommonTimes, Missed, Reach, 
 from modegraph.certify.switching.funnel import Arrival, Sinking, Sunk
 from modegraph.guarded import guarded
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.tail.box import Tail
+from modegraph.reach.tail.base import Tail
 
 FAR = 2.0
 """A flow that waits or is given up is not compared with targets it was never nearer to than this, at any look."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -39,16 +38,16 @@ from modegraph.model.sets.parametrised import ParametrisedSet
 from modegraph.reach.compiled import CompiledMode, compile_mode
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.cuts import nonlinear_variable
-from modegraph.reach.cover.ladder import CURVED
+from modegraph.reach.cover.cutting import Cutting
+from modegraph.reach.cover.degrees import CURVED, class_tail_order
+from modegraph.reach.cover.improve import improve
 from modegraph.reach.failure import Mechanism, engine_stopped
-from modegraph.reach.flow.flow import Order
-from modegraph.reach.flowpipe import DEFAULT_HORIZON, Cutting
+from modegraph.reach.flowpipe import DEFAULT_HORIZON
 from modegraph.reach.start.piece import Chart, Piece
-from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
+from modegraph.reach.tail.base import Tail, TailFailure
+from modegraph.reach.tail.box import TailSearch
 
 MOST_PARTS = 32
-LEAST_DEGREE, MOST_MONOMIALS = 3, 400
-"""Of the polynomials in the search for an invariant set."""
 DEEPEST = 7
 PROGRESS = 1.05
 """A cut must carry the constraints this much further, or it is the last one."""
@@ -111,26 +110,34 @@ def _legal_chains(
     compiled: CompiledMode, end: float, deadline: Deadline, progress: Callable[[str], None]
 ) -> list[Chain]:
     """Chains that cover all starts, cut where a constraint cannot be proved, as long as that helps."""
-    cutting = Cutting(compiled, end, deadline)
-    chains, _ = cutting.run()
-    while len(chains) < MOST_PARTS and not deadline.is_over:
+
+    def worst(chains: Sequence[Chain]) -> Chain | None:
         progress(f"{len(chains)} parts")
-        worst = min(chains, key=proved_until)
-        until = proved_until(worst)
-        if until >= min(end, worst.time) or (until >= 0.0 and sampled_violation(worst.flows[0])):
-            break
-        if worst.order.degree < CURVED:
-            halves, order = [worst.piece], Order(CURVED, CURVED - 1)
+        least = min(chains, key=proved_until)
+        until = proved_until(least)
+        hopeless = until >= 0.0 and sampled_violation(least.flows[0])
+        return None if until >= min(end, least.time) or hopeless else least
+
+    def cuts(chain: Chain) -> Iterator[list[Chain]]:
+        if chain.piece.depth >= DEEPEST:
+            return
+        if chain.order.degree < CURVED.degree:
+            halves, order = [chain.piece], CURVED
         else:
-            halves, order = worst.piece.split(nonlinear_variable(worst.flows[0])), worst.order
+            halves, order = chain.piece.split(nonlinear_variable(chain.flows[0])), chain.order
         children = [Chain(compiled, half, order, deadline) for half in halves]
         for child in children:
             child.run(end)
+        yield children
+
+    def gained(chain: Chain, children: list[Chain], chains: list[Chain]) -> bool:
+        until = proved_until(chain)
+        # A higher degree is kept as it is.
         further = min(map(proved_until, children), default=np.inf) > PROGRESS * until
-        if (until >= 0.0 and not further and len(halves) > 1) or worst.piece.depth >= DEEPEST:
-            break
-        chains = [chain for chain in chains if chain is not worst] + children
-    return chains
+        return until < 0.0 or further or len(children) == 1
+
+    chains, _ = Cutting(compiled, end, deadline).run()
+    return improve(chains, worst, cuts, gained, most=MOST_PARTS, deadline=deadline)[0]
 
 
 def _resting(mode: Mode, p: Floats | None, compiled: CompiledMode) -> TargetClass | None:
@@ -209,14 +216,14 @@ def _tails(compiled: CompiledMode, chains: Sequence[Chain]) -> list[Tail] | Tail
         flow = chain.flows[-1]
         if chain.failure or proved_instants(flow) < len(flow.steps) or not flow.steps:
             return TailFailure(Mechanism.ENDS_BEFORE_SETTLED)
-        order = Order(1, 0) if compiled.linear else _tail_order(chain)
+        order = class_tail_order(compiled.linear, chain.order, chain.piece.variables)
         search = TailSearch(
             flow.fields[-1], _own_chart(flow.piece), compiled.w_centre, compiled.w_radius, compiled.loop.names, order
         )
         tail = guarded("the search for an invariant set", partial(search.attempt, [flow]), _no_tail)
         if isinstance(tail, TailFailure):
             return tail
-        if not (tail.face_upper <= 0.0).all():
+        if not tail.is_legal:
             return TailFailure(Mechanism.CONSTRAINT_IN_TAIL)
         found.append(tail)
     return found
@@ -225,14 +232,6 @@ def _tails(compiled: CompiledMode, chains: Sequence[Chain]) -> list[Tail] | Tail
 def _no_tail(error: Exception) -> Tail | TailFailure:
     mechanism, fields = engine_stopped(error)
     return TailFailure(mechanism, **fields)
-
-
-def _tail_order(chain: Chain) -> Order:
-    """As high a degree as the flow has, within a size; a candidate set may have fewer variables, so no weights."""
-    degree = chain.order.degree
-    while degree > LEAST_DEGREE and math.comb(chain.piece.variables + degree, degree) > MOST_MONOMIALS:
-        degree -= 1
-    return Order(degree, min(degree - 1, chain.order.jacobian))
 
 
 def _own_chart(piece: Piece) -> Chart:

@@ -12,11 +12,12 @@ from modegraph.certify.legal import proved_instants, set_size
 from modegraph.certify.question import Question
 from modegraph.certify.switching.funnel import Arrival, Funnels, Sinking
 from modegraph.guarded import guarded
-from modegraph.reach.cover.restart import WIDE_GAP, filled_share, restarted
+from modegraph.reach.cover import restart
+from modegraph.reach.cover.degrees import tail_order
 from modegraph.reach.failure import Failure, Mechanism, engine_stopped
-from modegraph.reach.flow.flow import RESTART_FEEDBACK, RESTART_STEPS, Flow
-from modegraph.reach.parallelotope import mode_gap
-from modegraph.reach.tail.box import Tail, TailFailure, TailSearch
+from modegraph.reach.flow.flow import RESTART_FEEDBACK, Flow
+from modegraph.reach.tail.base import Tail, TailFailure
+from modegraph.reach.tail.box import TailSearch
 from modegraph.reach.tail.decay import SettledLoop
 from modegraph.reach.tail.funnel import NoFunnel
 
@@ -159,11 +160,11 @@ class Course:
             "the search for an invariant set",
             lambda: TailSearch(
                 flow.fields[-1], flow.piece.chart, compiled.w_centre, compiled.w_radius, compiled.loop.names,
-                question.tail_order,
+                tail_order(question.linear),
             ).attempt([flow]),
             _no_tail,
         )  # fmt: skip
-        if isinstance(outcome, Tail) and (outcome.face_upper <= 0.0).all():
+        if isinstance(outcome, Tail) and outcome.is_legal:
             self.tail, self._decay = outcome, outcome.decay
             return
         missed = Failure(Mechanism.CONSTRAINT_IN_TAIL) if isinstance(outcome, Tail) else outcome
@@ -233,18 +234,8 @@ def _no_funnel(error: Exception) -> Sinking | NoFunnel | None:
 
 
 def again(question: Question, last: Sequence[Flow], first: bool, common: bool) -> Flow | None:
-    """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
-
-    The first holds out longer while the set is large, the second is tighter in the end, and at
-    once where fast and slow modes are far apart (measured on the arm: 5 against 16). None where
-    the restart breaks down at once. ``common``: of one flow too only a box is kept, as of several.
-    """
-    flow, compiled = last[0], question.compiled
-    framed = not first or mode_gap(flow.slope) > WIDE_GAP
-    compact = common and (flow.generation == 0 or filled_share(flow) > 1.0)
-    following = restarted(last, compiled.framed_fields if framed else compiled.fields, compact=compact)
-    started = following is not None and following.time < question.end and following.advance(question.end)
-    if following is not None and started and proved_instants(following) == len(following.steps):
-        return following
-    flow.next_restart = len(flow.steps) + RESTART_STEPS
-    return None
+    """A flow around the ends of flows (`restart.again`) whose first step is proved to keep the constraints."""
+    return restart.again(
+        question.compiled, last, question.end, first=first, common=common,
+        legal=lambda flow: proved_instants(flow) == len(flow.steps),
+    )  # fmt: skip

@@ -15,16 +15,12 @@ from modegraph.certify.question import Question
 from modegraph.certify.reason import engine_reason
 from modegraph.certify.switching.common_time import Missed, widest_variable
 from modegraph.cores import in_parallel
-from modegraph.enclosure.monomials import monomial_count
 from modegraph.guarded import guarded
 from modegraph.reach.cover.cuts import nonlinear_variable, parts_of_refused
+from modegraph.reach.cover.degrees import PART_LADDER, part_order
 from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.start.piece import Piece
 
-LADDER = ((4, 3), (5, 4))
-"""Degrees of p and of the Jacobian flow: first try, and second try where the first breaks down."""
-MOST_MONOMIALS = 1300
-MOST_GENERATOR_MONOMIALS = 100
 MOST_PARTS = 64
 """Parts explored in all: each may use its share of what is left, whether or not the others need theirs. So the
 answer does not depend on which of them ends first."""
@@ -42,17 +38,8 @@ class Exploration:
     question: Question
     common: bool
 
-    def order(self, piece: Piece, effort: int) -> Order:
-        """Degrees for a piece: linear loops need 1; more effort, higher degree, as memory allows."""
-        m = piece.variables
-        if self.question.linear or m == 0:
-            return Order(1, 0)
-        degree, jacobian = LADDER[effort]
-        while degree > 3 and monomial_count((1,) * m, degree) > MOST_MONOMIALS:
-            degree -= 1
-        while jacobian > 1 and monomial_count((1,) * m, jacobian) > MOST_GENERATOR_MONOMIALS:
-            jacobian -= 1
-        return Order(degree, min(jacobian, degree - 1))
+    def _order(self, piece: Piece, effort: int) -> Order:
+        return part_order(self.question.linear, piece.variables, effort)
 
     def explore(
         self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int = 0, allowance: int = MOST_PARTS
@@ -76,7 +63,7 @@ class Exploration:
         cut_short = bool(found.failure or found.unproved)
         # A part whose remainder feeds itself is cut: smaller ones need no high degrees.
         finer = cut_short and not (found.refused and piece.depth > 0)
-        if finer and effort + 1 < len(LADDER) and self.order(piece, effort + 1) != self.order(piece, effort):
+        if finer and effort + 1 < len(PART_LADDER) and self._order(piece, effort + 1) != self._order(piece, effort):
             second = self.explore(piece, again, check_again, effort + 1, allowance)
             return merge(found, [second], again, check_again)
         if piece.depth >= DEEPEST_CUT or piece.variables == 0:
@@ -132,7 +119,7 @@ class Exploration:
 
     def _run(self, piece: Piece, wanted: Sequence[int], safety: bool, effort: int) -> Findings:
         question = self.question
-        flow = question.compiled.flow(piece, self.order(piece, effort), longest_step=question.longest_step)
+        flow = question.compiled.flow(piece, self._order(piece, effort), longest_step=question.longest_step)
         course = Course(question, [flow], True, self.common).run(wanted, safety)
         found = findings_of(course, wanted, safety, NOTHING)
         if not found.waits:

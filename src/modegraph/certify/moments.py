@@ -45,7 +45,7 @@ class Moments:
         Coefficients of y; ``size`` (K, f) bounds the terms that were rounded.
     spread : (K, f) or, of a round target, (K, 1) array
     farthest : float
-        Bounds |m| + spread.
+        Bounds the entries of |m| + spread in the states.
     """
 
     lo: Floats

@@ -14,7 +14,6 @@ from modegraph.expression.tape import Tape
 from modegraph.model.mode import Mode
 from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode
-from modegraph.reach.flow.flow import Order
 
 LOOKS = 400
 """Steps within the horizon, at least, for a linear loop, where they cost little; else half of that."""
@@ -86,8 +85,3 @@ class Question:
     def longest_step(self) -> float:
         """A crossing is looked for at the ends of steps only: enough of them within the horizon."""
         return np.inf if self.horizon is None else self.horizon / (LOOKS if self.linear else LOOKS / 2)
-
-    @property
-    def tail_order(self) -> Order:
-        """Degrees of the flow of a candidate for an invariant set."""
-        return Order(1, 0) if self.linear else Order(3, 2)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from modegraph.model.sets import Box
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.cover.cuts import nonlinear_variable
+from modegraph.reach.cover.improve import improve
 
 Floats = NDArray[np.float64]
 
@@ -73,44 +75,63 @@ class Links:
             return
         pairs = [self._pairs(relation, k) for k, relation in enumerate(self.relations)]
         open_, failing = self._failing(pairs)
-        hopeless: set[Chain] = set()
-        for _ in range(cuts):
-            enough = open_ <= SMALL * SAMPLES * len(pairs) or len(self.chains) >= MOST_PARTS
-            if enough or until.is_over:
-                return
-            candidates = [c for c in self.chains if c not in hopeless and c.shared == 0 and c.piece.depth < DEEPEST]
-            if not candidates:
-                return
-            worst = max(candidates, key=lambda chain: failing[chain])
-            if failing[worst] < WORTH * open_:
-                return
+
+        def worst(chains: Sequence[Chain]) -> Chain | None:
+            candidates = [c for c in chains if c.shared == 0 and c.piece.depth < DEEPEST]
+            if open_ <= SMALL * SAMPLES * len(pairs) or not candidates:
+                return None
+            most = max(candidates, key=lambda chain: failing[chain])
+            if failing[most] < WORTH * open_:
+                return None
             progress(f"{len(self.chains)} parts, {100.0 * open_ / (SAMPLES * len(pairs)):.0f} % of pairs undecided")
-            before = self.chains
-            self._cut(worst, until)
+            return most
+
+        def gained(chain: Chain, children: list[Chain], chains: list[Chain]) -> bool:
+            nonlocal open_, failing
+            before, self.chains = self.chains, chains
             now, failing_now = self._failing(pairs)
             if now > (1.0 - WORTH) * open_:
                 # Two variables may need a cut each, but then this one was not the first to cut.
                 self.chains = before
-                hopeless.add(worst)
-                continue
+                return False
             open_, failing = now, failing_now
+            return True
+
+        improve(
+            self.chains, worst, partial(self._halves, until=until), gained,
+            most=MOST_PARTS, deadline=until, most_cuts=cuts, persistent=True,
+        )  # fmt: skip
 
     def appear(self, until: Deadline, progress: Callable[[str], None]) -> None:
         """Cut the starts where a target that no pair of references is certified for is nearly met."""
         for j in range(len(self.goals)):
-            source, target, gauge = self._nearest(j)
-            while 1.0 < gauge <= NEAR and len(self.chains) < MOST_PARTS and not until.is_over:
-                worst = max(self.chains, key=lambda chain: self._gauge(chain, j, source, target))
-                if worst.shared or worst.piece.depth >= DEEPEST:
-                    break
-                progress(f"{len(self.chains)} parts, a target is missed by {gauge - 1.0:.2g} of its size")
-                before = self.chains
-                self._cut(worst, until)
-                source, target, closer = self._nearest(j)
-                if not closer <= NEARER * gauge:
-                    self.chains = before
-                    break
-                gauge = closer
+            self._bring_near(j, until, progress)
+
+    def _bring_near(self, j: int, until: Deadline, progress: Callable[[str], None]) -> None:
+        source, target, gauge = self._nearest(j)
+
+        def worst(chains: Sequence[Chain]) -> Chain | None:
+            if not 1.0 < gauge <= NEAR:
+                return None
+            farthest = max(chains, key=lambda chain: self._gauge(chain, j, source, target))
+            if farthest.shared or farthest.piece.depth >= DEEPEST:
+                return None
+            progress(f"{len(self.chains)} parts, a target is missed by {gauge - 1.0:.2g} of its size")
+            return farthest
+
+        def gained(chain: Chain, children: list[Chain], chains: list[Chain]) -> bool:
+            nonlocal source, target, gauge
+            before, self.chains = self.chains, chains
+            found = self._nearest(j)
+            if not found[2] <= NEARER * gauge:
+                self.chains = before
+                return False
+            source, target, gauge = found
+            return True
+
+        improve(
+            self.chains, worst, partial(self._halves, until=until), gained, most=MOST_PARTS, deadline=until
+        )  # fmt: skip
 
     def _nearest(self, j: int) -> tuple[Floats, Floats, float]:
         """The pair (1, ki), (1, kj) found nearest to being certified, and its gauge."""
@@ -129,14 +150,14 @@ class Links:
             return 0.0
         return float(Relation(self.region, goal, (part,), None).crossings(source, target).gauge[0])
 
-    def _cut(self, chain: Chain, until: Deadline) -> None:
-        """Halves of one chain's starts in its place."""
+    def _halves(self, chain: Chain, until: Deadline) -> Iterator[list[Chain]]:
+        """Chains of the halves of one chain's starts."""
         halves = chain.piece.split(nonlinear_variable(chain.flows[0]))
         children = [Chain(self.compiled, half, chain.order, until) for half in halves]
         for child in children:
             child.run(self.end)
             self._parts[child] = self._proofs(child)
-        self.chains = [other for other in self.chains if other is not chain] + children
+        yield children
 
     def _fails(self, part: Part | None, goal: TargetClass, source: Floats, target: Floats) -> NDArray[np.bool_]:
         """Pairs for which a part has starts and proves nothing."""

@@ -39,9 +39,10 @@ from modegraph.model.mode import Mode
 from modegraph.model.sets import is_subset
 from modegraph.model.target import Target
 from modegraph.reach.compiled import CompiledMode, compile_mode, compile_reset
+from modegraph.reach.cover.degrees import start_order, tail_order
 from modegraph.reach.failure import Failure, Mechanism
-from modegraph.reach.flow.flow import Order
-from modegraph.reach.tail.box import Tail, TailSearch
+from modegraph.reach.tail.base import Tail
+from modegraph.reach.tail.box import TailSearch
 
 POINT_STEPS = 3000
 """Longest validated trajectory tried as a counterexample, in steps."""
@@ -178,7 +179,7 @@ class _Unit:
         ]  # fmt: skip
         if not candidates:
             return
-        flow = compiled.flow(compiled.whole(), Order(1, 0) if compiled.linear else Order(4, 2))
+        flow = compiled.flow(compiled.whole(), start_order(compiled.linear))
         if flow.failure is not None or not (flow.faces_at(0.0, flow.set_at(0), 0) <= 0.0).all():
             return
         for k in candidates:
@@ -257,7 +258,7 @@ class _Unit:
         tail: Tail | None = None
         search: TailSearch | None = None
         last = run.flow.fields[-1]
-        order = Order(1, 0) if last.linear else Order(3, 2)
+        order = tail_order(last.linear)
         end = LONGEST_RUN if self.horizon is None else self.horizon
         checkpoint = 30
         while run.violation is None and run.flow.time < end and len(run.flow.steps) < POINT_STEPS:

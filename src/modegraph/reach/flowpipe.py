@@ -4,49 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modegraph.attach import with_methods
-from modegraph.cores import in_parallel, one_core
-from modegraph.deadline import NEVER, Deadline
+from modegraph.cores import one_core
 from modegraph.errors import ModegraphError
 from modegraph.model.faithful import require_faithful
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box, Set
-from modegraph.reach.compiled import CompiledMode, compile_mode
+from modegraph.reach.compiled import compile_mode
 from modegraph.reach.cover.chain import Chain
-from modegraph.reach.cover.cuts import nonlinear_variable
-from modegraph.reach.cover.ladder import class_orders, is_light, orders
-from modegraph.reach.cover.looseness import is_given_up, is_loose, is_very_loose, looseness, remainder
-from modegraph.reach.failure import Failure, Mechanism
-from modegraph.reach.flow.flow import Order
+from modegraph.reach.cover.cutting import Cutting
+from modegraph.reach.failure import Failure
 from modegraph.reach.flow.slices import Slicer, hull, outline
 from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.restrictor import Restrictor
-from modegraph.reach.start.piece import Piece
 
 if TYPE_CHECKING:
     from modegraph import api
 
 Floats = NDArray[np.float64]
 
-MOST_PIECES = 32
-DEEPEST_CUT = 9
-MOST_LOOSE_PIECES, WORTH_CUTTING = 8, 0.8
-"""A class of references that is very loose is cut into at most so many, while halves are by this much tighter."""
-MOST_TRIES = 3
-"""Places where a chain of flows is cut before it is given up."""
-MOST_TIGHTENED, NARROWER = 8, 0.9
-"""Complete chains are cut up to so many pieces, as long as the halves together end narrower by this in some state."""
-PROGRESS = 1.05
-"""A cut or a higher degree must get this much further, or it is the last one."""
-PATIENT_DEPTH = 2
-"""Pieces cut less often than this may get no further: two variables may need a cut each."""
 DEFAULT_HORIZON = 10.0
 """Seconds, for a set-point mode without a horizon."""
 
@@ -289,145 +270,3 @@ def _horizon(mode: Mode, horizon: float | None, label: str) -> float:
     if not 0.0 < end < math.inf:
         raise ModegraphError(f"{label}: flowpipe: horizon must be a positive, finite time in seconds, got {horizon!r}")
     return end
-
-
-@dataclass(frozen=True)
-class _Part:
-    """A piece with its best chain: which rung of the ladder made it, and the last rung worth trying."""
-
-    chain: Chain
-    rung: int
-    top: int
-
-
-class Cutting:
-    """Pieces of the start set, or of later sets, cut where the flowpipe ends first, as long as that gets further."""
-
-    def __init__(self, compiled: CompiledMode, end: float, deadline: Deadline = NEVER) -> None:
-        self.compiled, self.end, self.deadline = compiled, end, deadline
-        self.disturbed = bool(compiled.w_radius.any())
-
-    def run(self) -> tuple[list[Chain], Failure | None]:
-        """A chain for each piece, and why cutting ended where it failed."""
-        whole = self.compiled.whole()
-        if self.compiled.parameters:
-            ladder = class_orders(self.compiled, whole, self.end)
-        else:
-            ladder = orders(self.compiled, whole.variables)
-        parts = [self._best(whole, ladder, 0, len(ladder) - 1)]
-        stuck: Failure | None = None
-        while stuck is None and any(part.chain.failure for part in parts):
-            worst = min((part for part in parts if part.chain.failure), key=lambda part: part.chain.time)
-            stuck = Failure(Mechanism.NO_MORE_CUTS)
-            if self.deadline.is_over or len(parts) >= MOST_PIECES:
-                break
-            for k in self._places(worst.chain):
-                children = self._cut(worst, k, ladder)
-                if self._gained(worst.chain, [child.chain for child in children], k):
-                    # A piece without halves is proved to hold no start; not all are, for the start set is not empty.
-                    parts = [part for part in parts if part is not worst] + children
-                    stuck = None
-                    break
-                stuck = Failure(Mechanism.CUTS_DO_NOT_HELP)
-        if self.disturbed and stuck is None:
-            parts = self._tightened(parts, ladder)
-        elif self.compiled.parameters and stuck is None:
-            parts = self._tighter(parts, ladder)
-        return [part.chain for part in parts], stuck
-
-    def _tighter(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
-        """Pieces of a class of references, the loosest cut as long as they are very loose and that helps."""
-        while len(parts) < MOST_LOOSE_PIECES and not self.deadline.is_over:
-            loosest = max(parts, key=lambda part: looseness(part.chain))
-            if not is_very_loose(loosest.chain) or not loosest.chain.piece.variables:
-                break
-            children = self._cut(loosest, 0, ladder)
-            worst = max((looseness(child.chain) for child in children), default=0.0)
-            if worst > WORTH_CUTTING * looseness(loosest.chain):
-                break
-            parts = [part for part in parts if part is not loosest] + children
-        return parts
-
-    def _gained(self, whole: Chain, parts: Sequence[Chain], place: int) -> bool:
-        """Whether all parts get further than the whole did.
-
-        At a kink one is enough, for a cut leaves a part astride of it.
-        """
-        if place == 0 and whole.piece.depth < PATIENT_DEPTH and len(whole.flows) == 1:
-            return True
-        further = [not part.failure or part.time > PROGRESS * whole.time for part in parts]
-        return any(further) if whole.flows[place].astride is not None else all(further)
-
-    def _tightened(self, parts: list[_Part], ladder: Sequence[Order]) -> list[_Part]:
-        """Complete parts, the widest cut on the way as long as that makes its end much narrower."""
-        while len(parts) < MOST_TIGHTENED and not self.deadline.is_over:
-            size = np.maximum(_end_widths(parts), 1e-300)
-            widest = max(parts, key=lambda part: float((_end_widths([part]) / size).sum()))
-            places = [k for k in self._places(widest.chain) if k > 0 and k in widest.chain.fed()]
-            if not places:
-                break
-            children = self._cut(widest, places[0], ladder)
-            if any(child.chain.failure for child in children):
-                break
-            if not (_end_widths(children) <= NARROWER * _end_widths([widest])).any():
-                break
-            parts = [part for part in parts if part is not widest] + children
-        return parts
-
-    def _places(self, chain: Chain) -> list[int]:
-        """Flows of a chain, the start of which may be cut, best first."""
-        pieces = [flow.piece for flow in chain.flows]
-        able = [k for k in chain.weak() if pieces[k].depth < DEEPEST_CUT and pieces[k].variables > 0]
-        return able[:MOST_TRIES]
-
-    def _cut(self, part: _Part, k: int, ladder: Sequence[Order]) -> list[_Part]:
-        """The halves of a part: of the start set, or of a set that flow k > 0 was started again from."""
-        if k == 0:
-            halves = part.chain.piece.split(nonlinear_variable(part.chain.flows[0]))
-            return list(in_parallel([partial(self._best, half, ladder, part.rung, part.top) for half in halves]))
-        return list(in_parallel([partial(self._go_on, part, chain) for chain in part.chain.halves(k)]))
-
-    def _go_on(self, part: _Part, chain: Chain) -> _Part:
-        chain.run(self.end)
-        return replace(part, chain=chain)
-
-    def _best(self, piece: Piece, ladder: Sequence[Order], first: int, top: int) -> _Part:
-        """The chain of a piece with the first degree that is good enough, or the best one."""
-        light = [is_light(order, piece) for order in ladder]
-        best: _Part | None = None
-        given_up: _Part | None = None
-        for rung in range(first, top + 1):
-            if best is not None and self.deadline.is_over:
-                break
-            if best is not None and not light[rung] and (best.chain.failure or not is_very_loose(best.chain)):
-                break
-            chain = Chain(self.compiled, piece, ladder[rung], self.deadline)
-            impatient = best is None and not self.disturbed and rung < top and light[rung + 1]
-            done = chain.run(self.end, is_given_up if impatient else None)
-            if done and chain.time < self.end:
-                given_up = _Part(chain, rung, top)
-                continue
-            if given_up is not None and not done:
-                given_up.chain.run(self.end)
-                best = given_up
-            given_up = None
-            if best is not None and not _further(chain, best.chain):
-                return replace(best, top=best.rung)
-            best = _Part(chain, rung, top)
-            if not chain.begun or (done and (self.disturbed or not is_loose(chain))):
-                break
-        assert best is not None
-        return best
-
-
-def _end_widths(parts: Sequence[_Part]) -> Floats:
-    """Widths (n,) of the box around the ends of all parts."""
-    boxes = [part.chain.flows[-1].last_set.ranges() for part in parts]
-    return np.asarray(np.max([hi for _, hi in boxes], axis=0) - np.min([lo for lo, _ in boxes], axis=0))
-
-
-def _further(chain: Chain, other: Chain) -> bool:
-    """Whether a chain of higher degree is worth its cost: it gets further, or is narrower at the end."""
-    if chain.failure or other.failure:
-        return not chain.failure or chain.time > PROGRESS * other.time
-    return float(remainder(chain)[0].max()) < float(remainder(other)[0].max())

@@ -31,7 +31,8 @@ class ReachSet:
     - xi are the variables of ``piece``, each scaled to [-1, 1]; p shares them with every other set over the piece, so
       that the same xi at two instants is the same start with the same unknown constants.
     - p (n, N) are polynomials over the first N monomials of the table of ``bounds``. They may have coefficients
-      that are not finite, where an enclosure broke down: then the set is everything, and `is_finite` says so.
+      that are not finite, where an enclosure broke down: then the set is everything, `is_finite` says so, and bounds
+      are infinite or NaN, neither of which proves anything.
     - G (g, n, Nq), Nq <= N, is what G_g(xi) zeta_g of a flow is inside: each coefficient counts as a generator of
       its own. What a coordinate has in common with another is kept. g = 0 is possible.
     - box (n,) is not negative. It is what is known of each coordinate alone.

@@ -13,6 +13,7 @@ import modegraph as mg
 from modegraph.reach import flowpipe as module
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.cover import chain as chain_module
+from modegraph.reach.cover import cutting
 from modegraph.reach.cover.chain import Chain
 from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.flowpipe import Flowpipe
@@ -174,7 +175,7 @@ def pipe() -> Flowpipe:
 
 def test_what_breaks_down_whole_is_complete_in_pieces(pipe: Flowpipe, record_property: Any) -> None:
     assert pipe.complete, pipe.reason
-    assert 1 < pipe.pieces <= module.MOST_TIGHTENED
+    assert 1 < pipe.pieces <= cutting.MOST_TIGHTENED
     assert f"1 piece of the start set, cut into {pipe.pieces} on the way" in pipe.reason
     box = pipe.at(END)
     print(f"VDP, w +-{PUSH:g} at T = {END:g}: {pipe.pieces} pieces, width {box.hi - box.lo}")
@@ -210,7 +211,7 @@ def test_runs_under_switched_disturbances_stay_inside(pipe: Flowpipe, interval: 
 
 
 def test_cutting_on_the_way_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_PIECES", 1)
+    monkeypatch.setattr(cutting, "MOST_PIECES", 1)
     pipe = mg.flowpipe(van_der_pol(), horizon=END)
     assert not pipe.complete
     assert "1 piece of the start set; no more are tried" in pipe.reason

@@ -9,7 +9,7 @@ import pytest
 
 import modegraph as mg
 from modegraph.certify.verdict import Status
-from modegraph.reach import flowpipe
+from modegraph.reach.cover import cutting
 from modegraph.reach.start.piece import Piece, whole
 
 SETS = {
@@ -162,7 +162,7 @@ def test_a_piece_that_turns_out_empty_is_no_obstacle_to_a_proof(least: float, ce
 
 @pytest.mark.usefixtures("late")
 def test_the_flowpipe_leaves_out_a_piece_that_turns_out_empty(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(flowpipe, "PROGRESS", 0.0)
+    monkeypatch.setattr(cutting, "PROGRESS", 0.0)
     # From x0 = 0, between the lobes, the other state escapes at t = .3; from the lobes it grows by 15 % at most.
     mode = lobes(
         lambda x: np.array([0.0, 3.0 * (x[0] ** 2 - 1.0) ** 2 * x[1] ** 2]),

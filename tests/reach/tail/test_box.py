@@ -13,7 +13,8 @@ import modegraph as mg
 from modegraph.reach.compiled import compile_mode
 from modegraph.reach.failure import Mechanism
 from modegraph.reach.flow.flow import Flow, Order
-from modegraph.reach.tail.box import Tail, TailFailure, TailSearch, relevant_states
+from modegraph.reach.tail.base import Tail, TailFailure
+from modegraph.reach.tail.box import TailSearch, relevant_states
 from tests.soundness.families import Family, pendulum, references, runs
 
 

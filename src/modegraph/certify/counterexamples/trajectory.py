@@ -20,14 +20,14 @@ from modegraph.expression.tape import Tape
 from modegraph.model.mode import Mode
 from modegraph.model.sets import Box, Set, is_subset
 from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.cover.degrees import EXACT
 from modegraph.reach.field import Field
-from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.flow.flow import Flow
 from modegraph.reach.inverse import near_inverse
 from modegraph.reach.start.piece import point
 
 Floats = NDArray[np.float64]
 
-POINT_ORDER = Order(1, 0)
 FLOAT_STEPS, MOST_FLOAT_STEPS = 200, 1500
 """Steps of a trajectory in floats, at least, and at most."""
 TOUCHING = 1e-6
@@ -89,7 +89,7 @@ class PointRun:
             point(x0, d),
             w,
             np.zeros(len(w)),
-            POINT_ORDER,
+            EXACT,
             names=scene.names,
             reset=scene.reset if len(x0) == scene.plant else None,
             longest_step=longest_step,
@@ -245,7 +245,7 @@ def enclose_equilibrium(scene: Scene, guess: Floats, w: Floats, d: Floats) -> Eq
             break
     else:
         return None
-    flow = Flow(scene.fields, point(x, d), w, np.zeros(len(w)), POINT_ORDER, names=scene.names)
+    flow = Flow(scene.fields, point(x, d), w, np.zeros(len(w)), EXACT, names=scene.names)
     # Where Newton's method ends on a kink the slope may be another than that of its last step: singular, or NaN.
     near = near_inverse(slopes(inputs(x)[:, None])[: n * n, 0].reshape(n, n))
     if near is None or not np.isfinite(near[0]).all():

@@ -17,7 +17,7 @@ from modegraph.certify.verdict import Floats
 from modegraph.deadline import Deadline
 from modegraph.reach.failure import Mechanism
 from modegraph.reach.flow.flow import Flow
-from modegraph.reach.tail.box import Tail
+from modegraph.reach.tail.base import Tail
 from modegraph.reach.tail.decay import SettledLoop
 from modegraph.reach.tail.funnel import Funnel, FunnelBuilder, NoFunnel, NormBall
 

@@ -10,10 +10,9 @@ import numpy as np
 from modegraph.deadline import NEVER, Deadline
 from modegraph.reach.compiled import CompiledMode
 from modegraph.reach.cover.cuts import nonlinear_variable
-from modegraph.reach.cover.restart import WIDE_GAP, halved, restarted
+from modegraph.reach.cover.restart import again, halved, restarted
 from modegraph.reach.failure import Failure, Mechanism
-from modegraph.reach.flow.flow import LATE_FEEDBACK, RESTART_STEPS, Order
-from modegraph.reach.parallelotope import mode_gap
+from modegraph.reach.flow.flow import LATE_FEEDBACK, Order
 from modegraph.reach.start.piece import Piece
 
 
@@ -51,19 +50,10 @@ class Chain:
                 self._drop_unbounded()
                 return False
             if not self.compiled.linear and flow.wants_restart():
-                self._restart(end)
+                following = again(self.compiled, [flow], end, first=len(self.flows) == 1)
+                if following is not None:
+                    self.flows.append(following)
         return True
-
-    def _restart(self, end: float) -> None:
-        """In the coordinates of the plant first, then in the frame of the modes, tighter in the end."""
-        flow = self.flows[-1]
-        in_modes = len(self.flows) > 1 or mode_gap(flow.slope) > WIDE_GAP
-        fields = self.compiled.framed_fields if in_modes else self.compiled.fields
-        following = restarted([flow], fields)
-        if following is None or flow.time >= end or not following.advance(end):
-            flow.next_restart = len(flow.steps) + RESTART_STEPS
-        else:
-            self.flows.append(following)
 
     def _drop_unbounded(self) -> None:
         """Take back last steps whose bounds are not finite."""

@@ -8,8 +8,7 @@ restarting only widens.)
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import UNIT
+from modegraph.reach.compiled import CompiledMode
+from modegraph.reach.cover.degrees import restart_order
 from modegraph.reach.field import Field
-from modegraph.reach.flow.flow import Flow, Order
+from modegraph.reach.flow.flow import RESTART_STEPS, Flow, Order
 from modegraph.reach.generators import with_box
-from modegraph.reach.parallelotope import half_widths, principal_axes, tightest
+from modegraph.reach.parallelotope import half_widths, mode_gap, principal_axes, tightest
 from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.piece import Piece
 
@@ -28,8 +29,36 @@ Floats = NDArray[np.float64]
 
 WIDE_GAP = 8.0
 """Ratio of neighbouring decay rates from which the frame of the modes is used at the first restart."""
-FULL, CHEAP, MOST_MONOMIALS = Order(4, 3), Order(3, 2), 500
-"""Degrees after a restart, if that makes at most so many monomials, or else."""
+
+
+def again(
+    compiled: CompiledMode,
+    flows: Sequence[Flow],
+    end: float,
+    *,
+    first: bool,
+    common: bool = False,
+    legal: Callable[[Flow], bool] = lambda flow: True,
+) -> Flow | None:
+    """Restart around the ends of flows: in the coordinates of the plant, then in the frame of the modes.
+
+    The first holds out longer while the set is large, the second is tighter in the end, and at once where fast and
+    slow modes are far apart (measured on the arm: 5 against 16). None where the restart breaks down at once, or is
+    not ``legal`` after a step; then the first of the flows waits until it asks again.
+
+    Parameters
+    ----------
+    first : the flows have not been restarted before
+    common : of one flow too only a box is kept, as of several
+    """
+    flow = flows[0]
+    framed = not first or mode_gap(flow.slope) > WIDE_GAP
+    compact = common and (flow.generation == 0 or filled_share(flow) > 1.0)
+    following = restarted(flows, compiled.framed_fields if framed else compiled.fields, compact=compact)
+    if following is not None and following.time < end and following.advance(end) and legal(following):
+        return following
+    flow.next_restart = len(flow.steps) + RESTART_STEPS
+    return None
 
 
 def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool = False) -> Flow | None:
@@ -45,13 +74,12 @@ def restarted(flows: Sequence[Flow], fields: Sequence[Field], *, compact: bool =
     if piece is None:
         return None
     first = flows[0]
-    full = math.comb(piece.variables + FULL.degree, piece.variables)
     spent = [float(f.seen_bounds.upper(f.steps[-1].energy) + f.steps[-1].energy_radius) for f in flows]
     return _like(
         first,
         piece,
         fields=fields,
-        order=FULL if full <= MOST_MONOMIALS else CHEAP,
+        order=restart_order(piece.variables),
         t0=max(flow.time for flow in flows),
         energy=max(spent),
         generation=first.generation + 1,

@@ -10,13 +10,13 @@ the centre of B moves with the parameters, as the equilibria do: B(p) = c + T (p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modegraph.enclosure.rounding import TINY, UNIT
-from modegraph.reach.failure import Failure, Mechanism
+from modegraph.reach.failure import Mechanism
 from modegraph.reach.field import Field
 from modegraph.reach.float_loop import FloatLoop
 from modegraph.reach.flow.flow import Flow, Order
@@ -25,6 +25,7 @@ from modegraph.reach.parallelotope import half_widths, modal_axes
 from modegraph.reach.reach_set import ReachSet
 from modegraph.reach.start.class_chart import parameters_of, scale_of
 from modegraph.reach.start.piece import Chart, Piece
+from modegraph.reach.tail.base import Tail, TailFailure
 
 Floats = NDArray[np.float64]
 
@@ -34,29 +35,6 @@ FLOOR = 0.3
 TOO_MUCH_FEEDBACK = 0.6
 """A candidate set whose remainder feeds itself by this share is given up where a disturbance acts: soon the
 remainder grows without bound. (That of a class of references may do so for long.)"""
-
-
-@dataclass(frozen=True)
-class Tail:
-    """From ``start`` seconds on every trajectory stays in ``flow``'s tube for ever.
-
-    ``face_upper`` bounds each constraint face for all t >= start; ``tracking`` likewise |h(x) - r|.
-    ``lo``, ``hi`` (n,): a box around everything after ``start`` (infinite in states nothing reads).
-    ``decay``: rate of the slowest mode at the equilibrium, 1/s (a float estimate).
-    """
-
-    start: float
-    face_upper: Floats
-    tracking: Floats
-    lo: Floats
-    hi: Floats
-    decay: float
-
-
-class TailFailure(Failure):
-    """Why no invariant set was found."""
-
-    __slots__ = ()
 
 
 def relevant_states(fld: Field) -> list[int]:

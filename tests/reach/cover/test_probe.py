@@ -1,4 +1,4 @@
-"""Which degrees a flowpipe tries."""
+"""Which degrees a class of references is given, after a run of low degree."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import pytest
 import modegraph as mg
 from modegraph.enclosure.monomials import monomial_count
 from modegraph.reach.compiled import CompiledMode, compile_mode
-from modegraph.reach.cover import ladder
+from modegraph.reach.cover import degrees
 from modegraph.reach.cover.chain import Chain
-from modegraph.reach.cover.ladder import class_orders, is_light, orders
-from modegraph.reach.flow.flow import Order
-from tests.reach.test_flowpipe import follower, van_der_pol
+from modegraph.reach.cover.degrees import is_light, pipe_orders
+from modegraph.reach.cover.probe import orders_of
+from modegraph.reach.flow.records import Order
+from tests.reach.test_flowpipe import follower
 from tests.soundness.examples import load
 from tests.soundness.families import oscillator, pendulum, pushed
 
@@ -23,16 +24,9 @@ def compiled_of(mode: mg.Mode) -> CompiledMode:
     return compile_mode(mode, None, observed=False)
 
 
-def test_degrees_rise_only_where_they_are_cheap() -> None:
-    found = orders(compile_mode(van_der_pol(), None, observed=False), 2)
-    assert found[0].degree == 8
-    assert [o.degree for o in orders(compile_mode(van_der_pol(), None), 7)] == [3, 4, 6]
-    assert [o.degree for o in orders(compile_mode(follower(mg.setpoint([0.0])), None), 1)] == [1, 4]
-
-
 def test_a_class_where_all_is_linear_needs_degree_one() -> None:
     compiled = compiled_of(follower(mg.setpoint(mg.Box([0.0], [1.0]))))
-    assert class_orders(compiled, compiled.whole(), 1.0) == [Order(1, 0), Order(4, 3)]
+    assert orders_of(compiled, compiled.whole(), 1.0) == [Order(1, 0), Order(4, 3)]
 
 
 @pytest.mark.parametrize(
@@ -49,27 +43,27 @@ def test_what_is_not_linear_in_the_parameters_needs_more(reference: Any, start: 
     compiled = compiled_of(mode)
     assert compiled.linear
     assert not compiled.flat
-    assert class_orders(compiled, compiled.whole(), 1.0)[0].degree > 2
+    assert orders_of(compiled, compiled.whole(), 1.0)[0].degree > 2
 
 
 def test_nearly_straight_variables_count_twice() -> None:
     compiled = compiled_of(oscillator().mode)
     whole = compiled.whole()
-    (order,) = class_orders(compiled, whole, 2.5)[-1:]
+    (order,) = orders_of(compiled, whole, 2.5)[-1:]
     assert len(order.weights) == whole.variables
     assert set(order.weights) == {1, 2}
-    assert monomial_count(order.weights, order.degree) <= ladder.CLASS_MONOMIALS
+    assert monomial_count(order.weights, order.degree) <= degrees.CLASS_MONOMIALS
     assert is_light(order, whole)
 
 
 def test_a_class_that_is_tight_at_once_keeps_the_lowest_degree() -> None:
     compiled = compiled_of(pendulum().mode)
-    assert class_orders(compiled, compiled.whole(), 0.05) == orders(compiled, 3)[:1]
+    assert orders_of(compiled, compiled.whole(), 0.05) == pipe_orders(compiled, 3)[:1]
 
 
 def test_a_disturbed_class_has_moderate_degrees() -> None:
     compiled = compiled_of(pushed().mode)
-    assert max(o.degree for o in class_orders(compiled, compiled.whole(), 1.0)) <= ladder.MOST_DISTURBED
+    assert max(o.degree for o in orders_of(compiled, compiled.whole(), 1.0)) <= degrees.MOST_DISTURBED
 
 
 def test_a_run_for_the_weights_ends_before_it_breaks_down(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,7 +77,12 @@ def test_a_run_for_the_weights_ends_before_it_breaks_down(monkeypatch: pytest.Mo
         return advance(self, *arguments)
 
     monkeypatch.setattr(Chain, "run", run)
-    assert set(class_orders(compiled, compiled.whole(), 3.0)[0].weights) == {1, 2}
+    assert set(orders_of(compiled, compiled.whole(), 3.0)[0].weights) == {1, 2}
     (probe,) = probes
     assert not probe.failure
     assert probe.time < 3.0
+
+
+def test_one_reference_needs_no_probe() -> None:
+    compiled = compile_mode(follower(mg.setpoint([0.0])), None, observed=False)
+    assert orders_of(compiled, compiled.whole(), 1.0) == pipe_orders(compiled, compiled.whole().variables)
