@@ -66,6 +66,8 @@ TESTED_ELSEWHERE = {
     "expression/ufuncs.py": "expression/test_array.py: called as users do, by NumPy",
     "expression/protocol.py": "expression/test_array.py: called as users do, by NumPy",
     "expression/depth.py": "expression/test_namespace.py: a pause is one of a trace",
+    "reach/flow/passed.py": "reach/flow/test_flow.py: what a flow says, by the flow",
+    "reach/flow/observation.py": "reach/flow/test_flow.py: what is observed along the steps of a flow",
     "__main__.py": "test_main.py: a test's name has no underscores of its own",
 }
 """Files whose tests are in a file of another name, and why."""
@@ -84,9 +86,13 @@ def test_tests_mirror_the_sources_file_by_file() -> None:
         assert (ROOT / "tests" / reason.partition(": ")[0]).is_file()
 
 
+MOST_LINES = {"enclosure": 460, "expression": 420}
+"""Lines of a file, where that is not 400: kernels, and the graph of expressions."""
+
+
 @pytest.mark.parametrize("path", FILES.values(), ids=lambda p: str(p.relative_to(SOURCE)))
 def test_files_are_short_and_well_named(path: Path) -> None:
-    assert len(path.read_text(encoding="utf-8").splitlines()) < 500
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= MOST_LINES.get(path.relative_to(SOURCE).parts[0], 400)
     assert path.stem not in {"utils", "helpers", "misc", "common"}
 
 

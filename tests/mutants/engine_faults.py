@@ -149,7 +149,7 @@ ENGINE_FAULTS = (
     ),
     Fault(
         "the tube of a step forgets how far it bends",
-        "reach/flow/flow.py",
+        "reach/flow/passed.py",
         "        out = (step.bend + step.tube) * (1.0 + 4.0 * UNIT)",
         "        out = step.tube * (1.0 + 4.0 * UNIT)",
         ("tests/reach/test_flowpipe.py::test_van_der_pol_contains_its_runs",),

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from modegraph.enclosure.arguments import Errors, Guess, Initial, Settings, Workspace, program
 from modegraph.enclosure.monomials import Monomials, monomials
-from modegraph.enclosure.observe import observe_step, observed_bounds
 from modegraph.enclosure.rounding import UNIT
 from modegraph.enclosure.step import DONE, NO_CONTRACTION, flow_step
 from modegraph.expression.tape import Tape
@@ -20,14 +19,22 @@ from modegraph.reach.failure import Failure, Mechanism, engine_stopped
 from modegraph.reach.field import Field
 from modegraph.reach.flow.breakdown import breakdown
 from modegraph.reach.flow.error_table import error_table
-from modegraph.reach.flow.framing import into_frame, out_of_frame
+from modegraph.reach.flow.framing import into_frame
 from modegraph.reach.flow.grid import next_instant
+from modegraph.reach.flow.observation import observed_along
 from modegraph.reach.flow.passage import Passages
+from modegraph.reach.flow.passed import Passed
 from modegraph.reach.flow.records import Order, Step
-from modegraph.reach.flow.step_control import MOST_TIME_DEGREE, error_guess, feeding_cap, time_degree
+from modegraph.reach.flow.step_control import (
+    GROWTH_CAP,
+    MOST_TIME_DEGREE,
+    error_guess,
+    feeding_cap,
+    rate_cap,
+    time_degree,
+)
 from modegraph.reach.generators import generator_box, thinned
-from modegraph.reach.pointwise import evaluate_over, workspace
-from modegraph.reach.reach_set import ReachSet
+from modegraph.reach.pointwise import workspace
 from modegraph.reach.start.class_chart import start_polynomials
 from modegraph.reach.start.piece import Piece
 
@@ -37,33 +44,22 @@ JACOBIAN_TIME_DEGREE = 2
 FUNDAMENTAL_TIME_DEGREE = 5
 TOLERANCE = 1e-7
 """Local error per second aimed at, relative to the size of the states."""
-GROWTH_CAP = 0.1
-"""Largest spectral radius of h M, M the bound of how far the Jacobian strays from its centre."""
-RATE_CAP = 1.0
-"""Largest spectral radius of h A0, A0 the Jacobian at the centre."""
 OUTGROWN = 1e3
 """A remainder this many times larger than the set is given up."""
 RUNAWAY_STEPS = 10
 """A remainder that doubles over this many steps while they cover little time is given up."""
-DISTURBED_RATE_CAP = 0.4
-"""The same with a disturbance: the boxes of what strays within a step grow with h A0, faster than the steps save."""
-MANY_STATES, CAREFUL_RATE_CAP = 4, 0.2
-"""The same for loops of more states than that. Measured on the quadrotor (six states): a cruise takes 345 steps at 0.2
-(2.4 s), 448 at 0.25 (14 s), 559 at 0.3 (26 s), and breaks down at 0.4: what strays feeds itself, and steps shrink."""
 RESTART_STEPS, RESTART_FEEDBACK, RESTART_SHARE = 12, 0.05, 0.3
 """A disturbed flow is enclosed and started again after this many steps, when the remainder feeds
 itself by this share and is this large relative to the polynomial part."""
 LATE_FEEDBACK = 0.4
 """The share for flows that were restarted twice: then the set is small, and restarting only widens it."""
-FINE_RATE_CAP = 0.05
-"""The same where steps are cheap: linear loops and up to three states."""
 SHORTER_LOOKS = 4
 """How often a step is cut to a quarter because a constraint cannot be proved between its ends."""
 SMALLEST_STEP = 1e-7
 """A flowpipe stops when its step falls below this part of the time scale of the loop."""
 
 
-class Flow:
+class Flow(Passed):
     """Flowpipe of one piece of the starts of one mode, extended step by step.
 
     Parameters
@@ -126,7 +122,7 @@ class Flow:
         self._unknowns = unknowns
         self._errors = error_table(self.table, self.q, n)
         self._spaces: dict[tuple[int, str], Workspace] = {}
-        self._series: Workspace
+        self.series: Workspace
         self.time_degree = MOST_TIME_DEGREE
         self._cut = np.full(MOST_TIME_DEGREE + 1, order.degree, np.int64)
         if order.degree > 3:
@@ -180,38 +176,10 @@ class Flow:
             off = np.zeros(k)
         return np.vstack([p, z]), np.concatenate([slack, off])
 
-    def evaluate(self, tape: Tape, inputs: Floats, radius: Floats) -> tuple[Floats, Floats, int]:
-        """Outputs of a tape at one instant: polynomials (no, N), radii (no,), first undefined row or -1."""
-        return evaluate_over(tape, self.table, self.order.degree, inputs, radius)
-
-    def variables_at(self, t: float, reach: ReachSet, fld: Field) -> tuple[Floats, Floats]:
-        """Polynomials (nv, N) and radii (nv,) of all tape variables at one instant; the set as `set_at` gives it."""
-        inputs = np.zeros((fld.variables, self.table.size))
-        inputs[: fld.states] = reach.p
-        inputs[fld.time_index, 0] = t
-        inputs[fld.first_w : fld.first_d, 0] = self.w_centre
-        inputs[fld.first_d :] = self._unknowns
-        radius = np.zeros(fld.variables)
-        radius[: fld.states] = reach.spread
-        radius[fld.first_w : fld.first_d] = self.w_radius
-        return inputs, radius
-
-    def faces_at(self, t: float, reach: ReachSet, segment: int) -> Floats:
-        """Proved upper bound of every constraint face on a set at one instant, with the inputs of ``segment``."""
-        fld = self.fields[segment]
-        if not fld.faces:
-            return np.zeros(0)
-        inputs, radius = self.variables_at(t, reach, fld)
-        value, off, _ = self.evaluate(fld.observed, inputs, radius)
-        faces = value[: len(fld.faces)]
-        upper = self.bounds.upper(faces)
-        for i in np.flatnonzero((upper + off[: len(faces)] > 0.0) & np.isfinite(off[: len(faces)])):
-            upper[i] = min(upper[i], self.bounds.refined_upper(faces[i], -float(off[i])))
-        return np.asarray(upper + off[: len(faces)])
-
     # -- stepping --------------------------------------------------------------------------------
 
-    def _space(self, kind: str, tape: Tape, K: int, size: int, degree: int) -> Workspace:
+    def space(self, kind: str, tape: Tape, K: int, size: int, degree: int) -> Workspace:
+        """Arrays for the nodes of a tape, the same for each step of a segment."""
         key = (self.segment, kind)
         if key not in self._spaces:
             self._spaces[key] = workspace(tape, K, size, degree)
@@ -263,7 +231,10 @@ class Flow:
                 caps = min(
                     (
                         cap / value
-                        for value, cap in ((control[2], GROWTH_CAP), (control[3], self._rate_cap(fld)))
+                        for value, cap in (
+                            (control[2], GROWTH_CAP),
+                            (control[3], rate_cap(fld, bool(self.w_radius.any()))),
+                        )
                         if value > 0.0
                     ),
                     default=1.6,
@@ -275,7 +246,7 @@ class Flow:
                 degree = self.time_degree
                 if self.w_radius.any():
                     degree = time_degree(degree, rate / floor, float(control[3]))
-                seen = self._observe(fld, h, tube)
+                seen = observed_along(self, fld, h, tube)
                 look = shortened < SHORTER_LOOKS and h > 1e-6 and not (seen[0] <= 0.0).all()
                 # Between the ends a constraint is bounded through its bend: try a shorter look.
                 if look and (self.faces_at(t1, self._own(p, G), self.segment) <= 0.0).all():
@@ -306,15 +277,8 @@ class Flow:
         if self.segment not in self._passages:
             self._passages[self.segment] = Passages(self)
         passages = self._passages[self.segment]
-        ranges = self._series.ranges
+        ranges = self.series.ranges
         return passages.attempt(self, h, stop) if passages.near(ranges) else None
-
-    def _rate_cap(self, fld: Field) -> float:
-        if not self.w_radius.any():
-            return RATE_CAP
-        if fld.states <= 3 or fld.steady:
-            return FINE_RATE_CAP
-        return DISTURBED_RATE_CAP if fld.states <= MANY_STATES else CAREFUL_RATE_CAP
 
     def _runs_away(self) -> bool:
         """Whether the remainder has begun its last growth: it feeds itself while the steps shrink."""
@@ -332,8 +296,8 @@ class Flow:
     def _attempt(self, fld: Field, h: float) -> Any:
         f, j = fld.rates, fld.jacobian
         K, KJ = self.time_degree, JACOBIAN_TIME_DEGREE
-        big = self._series = self._space(f"f{K}", f, K, self.table.size, self.order.degree)
-        jac = self._space("j", j, KJ, self._errors.table.size, self._errors.table.order)
+        big = self.series = self.space(f"f{K}", f, K, self.table.size, self.order.degree)
+        jac = self.space("j", j, KJ, self._errors.table.size, self._errors.table.order)
         inputs = np.zeros((fld.variables, self.table.size))
         inputs[: fld.states] = self._p
         inputs[fld.time_index, 0] = self.time
@@ -387,34 +351,6 @@ class Flow:
             self.segment += 1
             self.h = min(self.h, 0.05)
 
-    def _observe(self, fld: Field, h: float, tube: Floats) -> tuple[Floats, Floats, float, Floats]:
-        faces = len(fld.faces)
-        ends, slack = self._observed(fld, h, tube, self.seen, 3)
-        upper, tracking = observed_bounds(ends, slack, np.int64(faces), *self.seen_bounds.arrays)
-        if faces and not (upper <= 0.0).all():
-            fine_ends, fine_slack = self._observed(fld, h, tube, self.order.degree, self.time_degree)
-            fine = self.bounds.upper(fine_ends[:2, :faces]).max(axis=0) + fine_slack[:faces, 0]
-            for i in np.flatnonzero(~(fine <= 0.0)):
-                if np.isfinite(fine_slack[i, 0]):
-                    limit = -fine_slack[i, 0]
-                    refined = [self.bounds.refined_upper(fine_ends[s, i], limit) for s in (0, 1)]
-                    fine[i] = min(fine[i], max(refined) + fine_slack[i, 0])
-            # Ends are added and compared in floats: one rounding each.
-            upper = np.fmin(upper, fine + 4.0 * UNIT * np.abs(fine))
-        return upper, ends[2, faces], float(slack[faces, 1]), tracking
-
-    def _observed(self, fld: Field, h: float, tube: Floats, q: int, K: int) -> tuple[Floats, Floats]:
-        o = fld.observed
-        size = int(self.table.start[q + 1])
-        space = self._space(f"o{q},{K}", o, K, size, q)
-        big = self._series
-        radius = np.zeros(fld.variables)
-        radius[: fld.states] = tube
-        radius[fld.first_w : fld.first_d] = self.w_radius
-        return observe_step(
-            big, fld.rates.variables, program(o), radius, h, np.full(K + 1, q, np.int64), space, self.table.arrays
-        )
-
     def _fail(self, fld: Field, status: int, node: int) -> None:
         widths = self.remainder
         if self.frame is not None:
@@ -444,48 +380,3 @@ class Flow:
             return False
         own = np.abs(self._p[:, 1:]).sum(axis=1)
         return bool((self.remainder > RESTART_SHARE * own).all())
-
-    # -- what it says ----------------------------------------------------------------------------
-
-    @property
-    def times(self) -> Floats:
-        """Grid instants, start included."""
-        return np.array([self.steps[0].start if self.steps else self.time, *(s.end for s in self.steps)])
-
-    def set_at(self, k: int) -> ReachSet:
-        """The set at grid instant k, in the coordinates of the fields."""
-        return self._own(self.p0, self.G0) if k == 0 else self._own(self.steps[k - 1].p, self.steps[k - 1].G)
-
-    def _own(self, p: Floats, G: Floats) -> ReachSet:
-        return ReachSet.of(self.bounds, p, G)
-
-    def reach_set(self, k: int) -> ReachSet:
-        """The set at grid instant k, in the coordinates of the states."""
-        own = self.set_at(k)
-        return own if self.frame is None else self._own(*out_of_frame(self.frame, own.p, own.G))
-
-    @property
-    def last_set(self) -> ReachSet:
-        """The set at the end, in the coordinates of the states."""
-        return self.reach_set(len(self.steps))
-
-    def swell(self, step: Step) -> Floats:
-        """Box (n,) by which the tube of a step exceeds the hull of p at its ends, state coordinates."""
-        out = (step.bend + step.tube) * (1.0 + 4.0 * UNIT)
-        if self.frame is not None:
-            # V p is rounded at both ends; the polynomials of neighbouring instants are of one size.
-            size = 8.0 * (step.p.shape[1] + len(out) + 8) * UNIT * (np.abs(step.p).sum(axis=1) + out)
-            out = np.abs(self.frame.V) @ (out + size) * (1.0 + 8.0 * (len(out) + 2) * UNIT)
-        return np.asarray(out)
-
-    def tubes(self) -> tuple[Floats, Floats]:
-        """Boxes (steps, n) of everything passed during each closed step."""
-        polynomials = np.stack([self.reach_set(k).p for k in range(len(self.steps) + 1)])
-        lo, hi = self.bounds.ranges(polynomials)
-        out = np.stack([self.swell(s) for s in self.steps])
-        if self.frame is not None:
-            before = np.concatenate([out[:1], out[:-1]])
-            out = np.maximum(out, out + 1e-12 * (before + np.abs(polynomials).sum(axis=2)[:-1]))
-        below = np.minimum(lo[:-1], lo[1:]) - out
-        above = np.maximum(hi[:-1], hi[1:]) + out
-        return np.nextafter(below, -np.inf), np.nextafter(above, np.inf)
