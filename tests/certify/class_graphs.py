@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 
 import modegraph as mg
+from modegraph.certify.class_unit import relate
+from modegraph.certify.question import TargetSpec
+from modegraph.certify.relation import Relation
+from modegraph.deadline import Deadline
 
 
 def double_integrators(dim: int) -> list[mg.Mode]:
@@ -35,3 +39,14 @@ def one_integrator(
     return mg.Mode(
         name, plant, controller=lambda x, r: -rate * (x - centre(r)), reference=mg.setpoint(region), start=start
     )
+
+
+def discs() -> Relation:
+    """From discs of .4 into discs of .2, around set-points in a square, by x' = r - x."""
+    square = mg.Box([-1.0, -1.0], [1.0, 1.0])
+    modes = [one_integrator(lambda r: r, lambda r, a=a: mg.Ball(r, a), square, f"m{a}") for a in (0.4, 0.2)]
+    spec = TargetSpec(modes[1].name, None, modes[1])
+    found = relate(modes[0], None, [spec], horizon=6.0, deadline=Deadline(60.0), progress=lambda text: None)
+    (made,) = found.relations
+    assert isinstance(made, Relation)
+    return made

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modegraph.certify.references import Parameter, parameter_text
-from modegraph.errors import ModegraphError
-from modegraph.reach.failure import Failure
+from modegraph.reach.failure import Failure, engine_stopped
 from modegraph.reach.statement import Kind, Statement, remedies, texts
 
 CLOSE = 5e-3
@@ -309,6 +308,5 @@ class Reason(Statement):
 
 def engine_reason(error: Exception) -> Reason:
     """What an error of the engine is: a limit that it names, or a fault of its own."""
-    if isinstance(error, ModegraphError):
-        return Reason(Outcome.ENGINE_LIMIT, text=str(error))
-    return Reason(Outcome.ENGINE_STOPPED, error=type(error).__name__, text=str(error))
+    mechanism, fields = engine_stopped(error)
+    return Reason(Outcome[mechanism.name], **fields)

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-import modegraph as mg
-from modegraph.certify.class_unit import relate
-from modegraph.certify.question import TargetSpec
 from modegraph.certify.relation import Relation
 from modegraph.certify.switching.families import OfEveryPair, OfPair
-from modegraph.deadline import Deadline
-from tests.certify.class_graphs import one_integrator
-
-SQUARE = mg.Box([-1.0, -1.0], [1.0, 1.0])
+from tests.certify.class_graphs import discs
 
 
 @pytest.fixture(scope="module")
 def relation() -> Relation:
-    modes = [one_integrator(lambda r: r, lambda r, a=a: mg.Ball(r, a), SQUARE, f"m{a}") for a in (0.4, 0.2)]
-    spec: Any = TargetSpec(modes[1].name, None, modes[1])
-    found = relate(modes[0], None, [spec], horizon=6.0, deadline=Deadline(60.0), progress=lambda text: None)
-    (made,) = found.relations
-    assert isinstance(made, Relation)
-    return made
+    return discs()
 
 
 def rows(*values: float) -> np.ndarray:
