@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing as mp
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import TracebackType
+from typing import Any
 
 import modegraph as mg
 from tests.soundness.parted import FAMILIES
@@ -18,15 +20,15 @@ PATIENCE = 5.0
 
 @dataclass(frozen=True)
 class Answers:
-    """What the library says of one instance: {target name: verdict}, the check, {target name: window}."""
+    """What the library says of one instance: {target name: verdict}, the check, {target name: (energy, window)}."""
 
     verdicts: dict[str, mg.Verdict]
     check: mg.Verdict
-    windows: dict[str, float | None]
+    figures: dict[str, tuple[float | None, float | None]]
 
 
 class Answering:
-    """A process that builds the instances it is asked for, one after another; a new one where the last was ended."""
+    """A process that builds what it is asked for, one after another; a new one where the last was ended."""
 
     def __init__(self) -> None:
         self._process: mp.process.BaseProcess | None = None
@@ -39,7 +41,13 @@ class Answering:
         self.end()
 
     def ask(self, family: str, seed: int) -> Answers | None:
-        """The answers; None if there are none after ``PATIENCE`` budgets."""
+        """The answers for one instance; None if they never come."""
+        found = self.call(answers, family, seed)
+        assert found is None or isinstance(found, Answers)
+        return found
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function of a module returns there; None if that is not known after ``PATIENCE`` budgets."""
         if self._process is None:
             context = mp.get_context("spawn")
             self._line, other = context.Pipe()
@@ -48,17 +56,15 @@ class Answering:
             other.close()
             assert self._line.recv() is None  # it has begun: what it loads is not counted
         assert self._line is not None
-        self._line.send((family, seed))
+        self._line.send((function, arguments))
         if not self._line.poll(PATIENCE * BUDGET):
             self.end()
             return None
         try:
-            found = self._line.recv()
+            return self._line.recv()
         except EOFError:
             self.end()
-            raise AssertionError(f"{family} {seed}: the process ended, its output says why") from None
-        assert isinstance(found, Answers)
-        return found
+            raise AssertionError(f"{function.__name__}{arguments}: the process ended, its output says why") from None
 
     def end(self) -> None:
         if self._process is not None:
@@ -71,15 +77,15 @@ def _serve(line: Connection) -> None:
     line.send(None)
     while True:
         try:
-            family, seed = line.recv()
+            function, arguments = line.recv()
         except EOFError:
             return
-        line.send(answers(family, seed))
+        line.send(function(*arguments))
 
 
 def answers(family: str, seed: int) -> Answers:
     instance = FAMILIES[family](seed)
     graph = mg.build([instance.mode, *instance.targets], horizon=instance.horizon, budget=BUDGET)
-    windows = {switch.target: switch.window for switch in graph.switches}
+    figures = {switch.target: (switch.energy, switch.window) for switch in graph.switches}
     verdicts = {goal.name: graph.verdict(instance.mode.name, goal.name) for goal in instance.targets}
-    return Answers(verdicts, graph.check(instance.mode.name), windows)
+    return Answers(verdicts, graph.check(instance.mode.name), figures)

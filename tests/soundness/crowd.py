@@ -27,7 +27,7 @@ LOOKS = 1500
 
 @dataclass(frozen=True)
 class Crowd:
-    """States x (times, n, k) and energy (times, k) at ``t``, inputs u (times, p, k); ``error`` (k,) bounds that of x."""
+    """States x (times, n, k), inputs u (times, p, k) and energy (times, k) at ``t``; x is right up to ``error`` (k,)."""
 
     t: Vector
     x: Vector
@@ -81,14 +81,15 @@ def _input(mode: mg.Mode, t: float, x: Vector) -> Vector:
 
 def _integrate(mode: mg.Mode, x: Vector, d: Mapping[str, Vector], w: Vector, t: Vector, rtol: float) -> Vector:
     """States and energy (times, n + 1, k)."""
-    y = np.vstack([x, np.zeros(x.shape[1])])
+    runs = x.shape[1]
+    y = np.vstack([x, np.zeros(runs)])
     out = np.empty((len(t), *y.shape))
     out[0] = y
     cuts = np.linspace(0.0, t[-1], HOLDS + 1)
     for push, (begin, end) in zip(w, pairwise(cuts), strict=True):
 
         def rate(s: float, flat: Vector, push: Vector = push) -> Vector:
-            x = flat.reshape(y.shape)[:-1]
+            x = flat.reshape(-1, runs)[:-1]
             u = _input(mode, s, x)
             dx = np.asarray(read(mode.system.dynamics, {"x": x, "u": u, "w": push, "d": d}))
             return np.vstack([dx, (u**2).sum(axis=0)]).ravel()
@@ -108,18 +109,20 @@ def _integrate(mode: mg.Mode, x: Vector, d: Mapping[str, Vector], w: Vector, t: 
 
 def contradicted(
     runs: Crowd,
-    region: mg.Box,
+    region: mg.Box | mg.Ball,
     verdict: mg.Verdict,
-    window: float | None,
+    figures: tuple[float | None, float | None],
     rooms: Mapping[str, Callable[[Any, Any], Any]],
 ) -> list[str]:
-    """What of a certified switch into ``region`` some run contradicts."""
+    """What of a certified switch into ``region``, its (energy, window) included, some run contradicts."""
+    energy, window = figures
     assert verdict.time is not None
     earliest, latest = verdict.time
     gauge = _gauge(region, runs.x)
     # Between two looks the gauge changes by less than twice what it changed around them.
     jump = np.abs(np.diff(gauge, axis=0)).max(axis=0) * 2.0
-    blur = runs.error / np.min(0.5 * (region.hi - region.lo))
+    size = region.radius if isinstance(region, mg.Ball) else float(np.min(0.5 * (region.hi - region.lo)))
+    blur = np.sqrt(runs.x.shape[1]) * runs.error / size
     until = int(np.searchsorted(runs.t, latest, side="right"))
     found = []
     least = gauge - jump - blur
@@ -139,8 +142,8 @@ def contradicted(
     first = np.where(maybe.any(axis=0), maybe.argmax(axis=0), until)
     before = np.arange(len(runs.t))[:, None] < np.minimum(first, until)
     spent = np.where(before, runs.energy, 0.0).max()
-    if verdict.energy is not None and spent > verdict.energy * (1.0 + 1e-6) + 1e-9:
-        found.append(f"a run spends {spent:.6g}, more than {verdict.energy:.6g}")
+    if energy is not None and spent > energy * (1.0 + 1e-6) + 1e-9:
+        found.append(f"a run spends {spent:.6g}, more than {energy:.6g}")
     found += _short_of_room(runs, verdict, rooms, before)
     if window is not None and not found:
         found += _short_stay(runs, maybe, latest, window)
@@ -153,7 +156,10 @@ def checked(runs: Crowd, verdict: mg.Verdict, rooms: Mapping[str, Callable[[Any,
     return _short_of_room(runs, verdict, rooms, np.broadcast_to((runs.t <= until)[:, None], runs.energy.shape))
 
 
-def _gauge(region: mg.Box, x: Vector) -> Vector:
+def _gauge(region: mg.Box | mg.Ball, x: Vector) -> Vector:
+    """(times, k): 1 on the boundary of the region, less inside."""
+    if isinstance(region, mg.Ball):
+        return np.linalg.norm(x - region.c[:, None], axis=1) / region.radius
     middle, half = 0.5 * (region.lo + region.hi), 0.5 * (region.hi - region.lo)
     return (np.abs(x - middle[:, None]) / half[:, None]).max(axis=1)
 

@@ -149,10 +149,10 @@ def many_parts(seed: int) -> Instance:
     rng = np.random.default_rng([33, seed])
     wide = 0.3 if seed % 2 else 0.1
     lo = _draw(rng, 0.2, 0.4)
-    each = {"a": (lo, lo + 2.0), "b": (lo, lo + 2.5)} if seed % 2 == 0 else {"a": (lo, lo + 4.5)}
+    each = {"a": (lo, lo + 4.5)} if seed % 2 else {"a": (lo, lo + 2.0), "b": (lo, lo + 2.5)}
     soft = _draw(rng, 0.25, 0.35, 3)
     spring = Spring(each, soft=soft, stiff=soft * float(rng.choice([0.3, 0.8])), push=(0.05, 0.05))
-    return _swinging(f"many parts {seed}", rng, spring, 15.0, rng.uniform(0.25, 0.9, 3), wide)
+    return _swinging(f"many parts {seed}", rng, spring, 15.0, rng.uniform(0.3, 0.8, 2), wide)
 
 
 def bent_parts(seed: int) -> Instance:
@@ -173,7 +173,7 @@ def bent_parts(seed: int) -> Instance:
         push=(0.05, 0.05),
         bend=bends[seed % len(bends)],
     )
-    return _swinging(f"bent parts {seed}", rng, spring, 15.0, rng.uniform(0.25, 0.9, 2))
+    return _swinging(f"bent parts {seed}", rng, spring, 15.0, rng.uniform(0.3, 0.9, 1))
 
 
 def _oscillator(
@@ -198,20 +198,21 @@ def known_unknowns(seed: int) -> Instance:
     places = [(count, place) for count in (2, 3) for place in range(count)]
     count, place = places[seed % len(places)]
     known = _draw(rng, 0.4, 0.9)
-    ranges = [(lo, lo + _draw(rng, 0.05, 0.25)) for lo in rng.uniform(0.3, 0.8, count).round(2).tolist()]
+    width = (0.9, 1.1) if count == 2 else (0.3, 0.4)
+    ranges = [(lo, lo + _draw(rng, *width)) for lo in rng.uniform(0.8, 1.1, count).round(2).tolist()]
     ranges[place] = (known, known)
     names = list("abc"[:count])
-    friction = _draw(rng, 0.4, 0.7)
-    wide = _draw(rng, 0.2, 0.3)
+    friction = _draw(rng, 0.32, 0.4)
+    wide = _draw(rng, 0.3, 0.4)
 
     def slope(x: Any, u: Any, d: Any) -> Any:
         stiff = sum(d[name] for name in names)
         return np.array([x[1], u[0] - stiff * x[0] - friction * x[1] - x[0] ** 3])
 
     start = mg.Box([1.0 - wide, -wide], [1.0 + wide, wide])
-    goals = (mg.Target("rest", mg.Box([-0.12, -0.12], [0.12, 0.12])),)
+    goals = (mg.Target("rest", mg.Ball([0.0, 0.0], 0.15)),)
     return _oscillator(
-        f"known unknowns {seed}", slope, start, goals, 30.0, unknowns=dict(zip(names, ranges, strict=True))
+        f"known unknowns {seed}", slope, start, goals, 40.0, unknowns=dict(zip(names, ranges, strict=True))
     )
 
 
@@ -240,6 +241,5 @@ def settled_kinks(seed: int) -> Instance:
 
 
 FAMILIES = {
-    make.__name__: make
-    for make in (slow_parts, parts_together, many_parts, bent_parts, known_unknowns, settled_kinks)
+    make.__name__: make for make in (slow_parts, parts_together, many_parts, bent_parts, known_unknowns, settled_kinks)
 }

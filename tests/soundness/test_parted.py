@@ -42,8 +42,8 @@ def judge(instance: Instance, answers: Answers | None) -> Outcome:
         outcome.answers[verdict.status.value] += 1
         wrong = _wrong(instance, goal, verdict)
         if verdict.status is mg.Status.CERTIFIED:
-            assert isinstance(goal.set, mg.Box)
-            wrong += contradicted(runs, goal.set, verdict, answers.windows[goal.name], instance.rooms)
+            assert isinstance(goal.set, mg.Box | mg.Ball)
+            wrong += contradicted(runs, goal.set, verdict, answers.figures[goal.name], instance.rooms)
         outcome.faults += [f"{goal.name}: {text}" for text in wrong]
     never = mg.Target("never", mg.Ball(np.full(instance.mode.start.dim, 1e9), 1.0))
     wrong = _wrong(instance, never, answers.check) + checked(runs, answers.check, instance.rooms)
