@@ -27,7 +27,7 @@ LOOKS = 1500
 
 @dataclass(frozen=True)
 class Crowd:
-    """States x (times, n, k), inputs u (times, p, k) and energy (times, k) at ``t``; x is right up to ``error`` (k,)."""
+    """States x (times, n, k), inputs u (times, p, k), energy (times, k) at ``t``; x is right up to ``error`` (k,)."""
 
     t: Vector
     x: Vector

@@ -16,9 +16,16 @@ from tests.soundness.checker import refutation_holds
 from tests.soundness.crowd import checked, contradicted, crowd
 from tests.soundness.parted import FAMILIES, Instance
 
-QUICK = {"slow_parts": 0, "parts_together": 0, "known_unknowns": 1, "settled_kinks": 0}
-"""A seed of each kind that is answered fast."""
-SEEDS = 12
+QUICK = [("slow_parts", 3), ("parts_together", 5), ("known_unknowns", 1), ("settled_kinks", 3), ("settled_kinks", 19)]
+"""Each of these once had a false or a lost answer, or none at all."""
+SEEDS = {
+    "slow_parts": 8,
+    "parts_together": 10,
+    "many_parts": 6,
+    "bent_parts": 8,
+    "known_unknowns": 12,
+    "settled_kinks": 30,
+}
 STOPPED = "the proof engine stopped"
 
 
@@ -58,13 +65,17 @@ def _wrong(instance: Instance, goal: mg.Target, verdict: mg.Verdict) -> list[str
     return [verdict.reason] if STOPPED in verdict.reason else []
 
 
+def test_every_family_is_asked() -> None:
+    assert list(SEEDS) == list(FAMILIES)
+
+
 @pytest.fixture(scope="module")
 def answering() -> Iterator[Answering]:
     with Answering() as process:
         yield process
 
 
-@pytest.mark.parametrize(("family", "seed"), QUICK.items())
+@pytest.mark.parametrize(("family", "seed"), QUICK)
 def test_quick(answering: Answering, family: str, seed: int) -> None:
     outcome = judge(FAMILIES[family](seed), answering.ask(family, seed))
     assert not outcome.faults
@@ -72,11 +83,11 @@ def test_quick(answering: Answering, family: str, seed: int) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", SEEDS)
 def test_campaign(answering: Answering, family: str, record_property: Any) -> None:
-    outcomes = [judge(FAMILIES[family](seed), answering.ask(family, seed)) for seed in range(SEEDS)]
+    outcomes = [judge(FAMILIES[family](seed), answering.ask(family, seed)) for seed in range(SEEDS[family])]
     total = sum((o.answers for o in outcomes), Counter())
     faults = [f"{o.name}: {text}" for o in outcomes for text in o.faults]
     record_property("campaign", f"{family}: {dict(total)}, {len(faults)} faults")
     assert not faults, "\n".join(faults)
-    assert total["certified"] >= 0.3 * sum(total.values()), total
+    assert total["certified"] >= 0.2 * sum(total.values()), total
