@@ -28,7 +28,7 @@ def van_der_pol(start: mg.Box, *, disturbance: float = 0.0, limit: float | None 
     else:
         mode = autonomous("van der Pol", field, "x y", start)
     if limit is not None:
-        mode.constraints = lambda x: {"y": x[1] <= limit}
+        mode = mode.replace(constraints=lambda x: {"y": x[1] <= limit})
     return mode
 
 
@@ -40,7 +40,7 @@ def coupled_van_der_pol(start: mg.Box, *, b: tuple[float, float], limit: float |
 
     mode = autonomous("coupled van der Pol", field, "x1 y1 x2 y2", start, unknowns={"b": b})
     if limit is not None:
-        mode.constraints = lambda x: {"y": x[1::2] <= limit}
+        mode = mode.replace(constraints=lambda x: {"y": x[1::2] <= limit})
     return mode
 
 

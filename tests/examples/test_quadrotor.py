@@ -104,10 +104,21 @@ def test_tasks_of_the_module(quadrotor: Any) -> None:
         assert quadrotor.plan(**task).modes[-1] == task["goal"]
 
 
-@pytest.mark.parametrize("target", ["climb", "cruise", "land"])
-def test_a_descent_that_starts_where_another_mode_does_is_said_to_touch_it(quadrotor: Any, target: str) -> None:
-    """The starts are equal: at t = 0 they fill the target, and only what is allowed for rounding is missing."""
+@pytest.mark.parametrize("target", ["climb", "cruise"])
+def test_a_descent_that_starts_where_another_mode_does_may_go_over_to_it_at_once(quadrotor: Any, target: str) -> None:
+    """The starts are equal: at t = 0 they fill the target, and touching is inside."""
     verdict = quadrotor.verdict("land", target)
+    assert verdict.certified, verdict.reason
+    (reason,) = verdict.why
+    one = quadrotor.verdict("land", target, reason.fields["r_i"], reason.fields["r_j"])
+    assert one.certified
+    assert one.time == (0.0, 0.0)
+    assert one.margin == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_touches_its_own_start_is_said_to_touch_it(quadrotor: Any) -> None:
+    """From one descent to another beside it: the starts are not inside, however near the other is."""
+    verdict = quadrotor.verdict("land", "land")
     (reason,) = verdict.why
     assert reason.outcome is mg.Outcome.NO_COMMON_TIME
     assert reason.fields["time"] == 0.0

@@ -153,11 +153,11 @@ class Relation:
 
     def worst(self, source: Floats, target: Floats) -> tuple[int, float]:
         """For one pair (1, ki), (1, kj) with a finite gauge: the part that decides it, and its best instant (s)."""
-        there = self.goal.at(target)
+        there = Targets(*self.goal.at(target))
         found: list[tuple[float, int, float]] = []
         for k, part in enumerate(self.parts):
             if part.meets(source, source)[0]:
-                gauges = part_gauges(k, source, *there, *self._table)[0]
+                gauges = part_gauges(k, source, there, self._rows, self._table)[0]
                 best = int(np.argmin(gauges))
                 found.append((float(gauges[best]), k, float(np.concatenate([f.times for f in part.flows])[best])))
         return max(found)[1:]

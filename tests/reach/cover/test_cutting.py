@@ -14,6 +14,7 @@ from modegraph.reach.cover import cutting as module
 from modegraph.reach.cover.cuts import nonlinear_variable
 from modegraph.reach.cover.cutting import Cutting
 from modegraph.reach.cover.looseness import looseness
+from modegraph.reach.failure import Failure, Mechanism
 from modegraph.reach.flow.flow import Flow, Order
 from modegraph.reach.flowpipe import Flowpipe
 from tests.reach.test_flowpipe import escaping, field_mode, van_der_pol, vdp_field
@@ -113,7 +114,7 @@ def test_time_that_is_up_cuts_nothing() -> None:
     over = Deadline(-1.0)
     chains, why = Cutting(compiled, 0.3, over).run()
     assert len(chains) == 1
-    assert why == "; no more are tried"
+    assert why == Failure(Mechanism.NO_MORE_CUTS)
     assert over.met
 
 
@@ -121,7 +122,7 @@ def test_a_cut_that_gets_no_further_is_undone() -> None:
     """Every part with the largest start escapes at t = 1."""
     compiled = compile_mode(escaping(), None, observed=False)
     chains, why = Cutting(compiled, 2.0).run()
-    assert why == "; cutting it gets no further"
+    assert why == Failure(Mechanism.CUTS_DO_NOT_HELP)
     assert min(chain.time for chain in chains) < 1.0
 
 
