@@ -119,8 +119,10 @@ def contradicted(
     assert verdict.time is not None
     earliest, latest = verdict.time
     gauge = _gauge(region, runs.x)
-    # Between two looks the gauge changes by less than twice what it changed around them.
-    jump = np.abs(np.diff(gauge, axis=0)).max(axis=0) * 2.0
+    # Between two looks the gauge falls below both by no more than it changes around them.
+    change = np.abs(np.diff(gauge, axis=0))
+    still = np.zeros_like(change[:1])
+    jump = np.maximum(np.vstack([still, change]), np.vstack([change, still]))
     size = region.radius if isinstance(region, mg.Ball) else float(np.min(0.5 * (region.hi - region.lo)))
     blur = np.sqrt(runs.x.shape[1]) * runs.error / size
     until = int(np.searchsorted(runs.t, latest, side="right"))

@@ -147,12 +147,12 @@ def parts_together(seed: int) -> Instance:
 def many_parts(seed: int) -> Instance:
     """Two unknowns, or a wide start: more than two parts go on together."""
     rng = np.random.default_rng([33, seed])
-    wide = 0.3 if seed % 2 else 0.1
+    wide = 0.2 if seed % 2 else 0.1
     lo = _draw(rng, 0.2, 0.4)
-    each = {"a": (lo, lo + 4.5)} if seed % 2 else {"a": (lo, lo + 2.0), "b": (lo, lo + 2.5)}
+    each = {"a": (lo, lo + 4.0)} if seed % 2 else {"a": (lo, lo + 2.0), "b": (lo, lo + 2.0)}
     soft = _draw(rng, 0.25, 0.35, 3)
-    spring = Spring(each, soft=soft, stiff=soft * float(rng.choice([0.3, 0.8])), push=(0.05, 0.05))
-    return _swinging(f"many parts {seed}", rng, spring, 15.0, rng.uniform(0.3, 0.8, 2), wide)
+    spring = Spring(each, soft=soft, stiff=soft * float(rng.choice([0.5, 0.85])), push=(0.05, 0.05))
+    return _swinging(f"many parts {seed}", rng, spring, 15.0, rng.uniform(0.35, 0.6, 2), wide)
 
 
 def bent_parts(seed: int) -> Instance:
